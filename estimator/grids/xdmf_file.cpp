@@ -12,7 +12,7 @@
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/text.hpp"
-#include "protocol/runfile/h5_handle.hpp"
+#include "protocol/runfile/h5_source.hpp"
 
 namespace diastole {
 namespace {
@@ -21,12 +21,9 @@ using runfile::DatasetHandle;
 using runfile::FileHandle;
 using runfile::SpaceHandle;
 
-constexpr hsize_t most_numbers = hsize_t{1} << 29;
-
 class XdmfReader {
  public:
   explicit XdmfReader(const std::string& path) : file_(path) {
-    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
     const std::string text = read_whole_file(path);
     const pugi::xml_parse_result parsed = document_.load_buffer(text.data(), text.size());
     if (!parsed) refuse(fmt::format("byte {}", parsed.offset), parsed.description());
@@ -82,18 +79,13 @@ class XdmfReader {
 
   std::vector<double> dataset(const std::string& name, const std::string& path, const std::string& place) {
     const std::filesystem::path beside = std::filesystem::path(file_).parent_path() / name;
-    const FileHandle file(H5Fopen(beside.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
-    if (!file.valid()) refuse(place, fmt::format("{} cannot be opened as HDF5", beside.string()));
-    const DatasetHandle set(H5Dopen2(file.get(), path.c_str(), H5P_DEFAULT));
-    if (!set.valid()) refuse(place, fmt::format("{} has no dataset {}", beside.string(), path));
-    const SpaceHandle space(H5Dget_space(set.get()));
-    const hssize_t count = H5Sget_simple_extent_npoints(space.get());
-    if (count < 0 || static_cast<hsize_t>(count) > most_numbers)
-      refuse(place, fmt::format("{} is too long", path));
-    std::vector<double> values(static_cast<size_t>(count));
-    if (H5Dread(set.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0)
-      refuse(place, fmt::format("{} of {} cannot be read as numbers", path, beside.string()));
-    return values;
+    try {
+      return runfile::H5Source(beside).field(path);
+    } catch (const InputError& error) {
+      const InputFault& fault = error.fault();
+      refuse(place, fmt::format("{}{}: {}", fault.file, fault.place.empty() ? "" : ", " + fault.place,
+                                fault.problem));
+    }
   }
 
   void read_geometry(const pugi::xml_node& node, FieldGrid& grid) {

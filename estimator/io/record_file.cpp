@@ -1,6 +1,7 @@
 #include "estimator/io/record_file.hpp"
 
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole {
 namespace {
@@ -26,7 +27,7 @@ void RecordFormat::read(std::string_view text, const std::string& file,
     return InputError({file, place, std::move(problem), std::string(remedy)});
   };
   try {
-    const Json json = Json::parse(text);
+    const Json json = Json::parse(text, no_deeper_than<Json>());
     if (is_named_always && (!json.is_object() || json.value("format", "") != name))
       throw refuse("key format", fmt::format("is not \"{}\"", name));
     unsigned version = newest_version;

@@ -183,6 +183,9 @@ class Acquisition {
     if (outcome_.counts.saturated != before) hooks_.progress(outcome_.counts);
   }
   void close_saturation() {
+    for (ChannelSaturation& channel : saturation_)
+      channel.watch.finish();
+    watch_saturation();
     for (size_t i = 0; i < saturation_.size(); ++i) {
       const int64_t samples = saturation_[i].watch.samples();
       if (samples == 0) continue;

@@ -6,20 +6,19 @@
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <span>
-#include <vector>
 
+#include "protocol/contract/bounded_file.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
 namespace {
 
+constexpr const char* its_image = "Give the .elf that was built with the image that the controller runs.";
+
 [[noreturn]] void refuse(const std::string& file, const char* problem) {
-  throw InputError(
-      {file, "", problem, "Give the .elf that was built with the image that the controller runs."});
+  throw InputError({file, "", problem, its_image});
 }
 
 template <class Structure>
@@ -48,10 +47,8 @@ std::string demangled(const std::string& name) {
 }  // namespace
 
 ElfSymbols::ElfSymbols(const std::string& file) {
-  std::ifstream stream(file, std::ios::binary);
-  const std::vector<char> bytes{std::istreambuf_iterator<char>(stream), {}};
-  if (bytes.size() < SELFMAG || std::memcmp(bytes.data(), ELFMAG, SELFMAG) != 0)
-    refuse(file, bytes.empty() ? "cannot be read or is empty" : "is no ELF file");
+  const std::string bytes = read_bounded_file(file, most_table_bytes, its_image);
+  if (!bytes.starts_with(ELFMAG)) refuse(file, bytes.empty() ? "is empty" : "is no ELF file");
   const auto header = structure_at<Elf32_Ehdr>(file, bytes, 0);
   if (header.e_ident[EI_CLASS] != ELFCLASS32 || header.e_machine != EM_ARM)
     refuse(file, "is not for a 32-bit ARM");

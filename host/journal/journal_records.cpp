@@ -283,12 +283,13 @@ std::vector<uint8_t> encode(const PositionBlock& block) {
 }
 
 std::optional<Document> decode_document(std::span<const uint8_t> payload) {
-  const json object = json::parse(payload.begin(), payload.end(), nullptr, false);
   try {
+    const json object = json::parse(payload.begin(), payload.end(), no_deeper_than<json>(), false);
     if (object.is_object()) return read_document(object);
   } catch (const json::exception&) {
     // whole by its CRC but not of this version's form: it shows as missing by what it leaves out
   } catch (const std::out_of_range&) {
+  } catch (const JsonTooDeep&) {
   }
   return std::nullopt;
 }

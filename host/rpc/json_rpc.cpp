@@ -11,14 +11,13 @@ using nlohmann::json;
 
 std::string line_of(const json& message) { return json_text(message) + "\n"; }
 
-/// Discarded if it is no JSON. Deeper values are refused while they are read: copying one recurses, and would take
-/// more stack than there is.
+/// Discarded if it is no JSON.
 json parsed(std::string_view line) {
-  const auto bounded = [](int depth, json::parse_event_t, json&) {
-    if (depth > most_depth) throw Error(Code::parse_error, "this line is nested too deeply");
-    return true;
-  };
-  return json::parse(line, bounded, false);
+  try {
+    return json::parse(line, no_deeper_than<json>(most_depth), false);
+  } catch (const JsonTooDeep&) {
+    throw Error(Code::parse_error, "this line is nested too deeply");
+  }
 }
 
 json error_object(Code code, const std::string& message, const json& data) {

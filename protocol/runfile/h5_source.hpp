@@ -3,7 +3,8 @@
 // fixed or variable length, in datasets, attributes and table columns alike.
 //
 // A file may come from anywhere. What it claims is held against what it has before memory is taken: no link leads out of it, no
-// dataset's values lie in another file, no dataset has more rows than its bytes can hold, and no plug-in is loaded to read it.
+// dataset's values lie in another file, no dataset has more rows than its bytes can hold or a packed chunk of more bytes than are
+// unpacked at a time, and no plug-in is loaded to read it.
 //
 // Errors: every member throws InputError naming the file and the object that is missing or of the wrong kind.
 
@@ -11,6 +12,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
@@ -69,18 +71,24 @@ class H5Source {
     return names;
   }
 
-  /// A one-dimensional dataset of numbers.
+  /// A one-dimensional dataset of numbers: of triggers, phases, points; no samples.
   [[nodiscard]] std::vector<double> numbers(const std::string& path) const {
     const DatasetHandle dataset = open_dataset(path);
-    if (!is_number(TypeHandle(H5Dget_type(dataset.get())))) {
-      fail("dataset " + path, "does not hold numbers");
-    }
-    std::vector<double> values(length(dataset, path));
-    if (!values.empty() &&
-        H5Dread(dataset.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
-      fail("dataset " + path, "cannot be read; the file is damaged");
-    }
-    return values;
+    return read_numbers(dataset, path, length(dataset, path, most_rows));
+  }
+  /// A recording's samples, all of them in memory.
+  [[nodiscard]] std::vector<double> samples(const std::string& path) const {
+    const DatasetHandle dataset = open_dataset(path);
+    return read_numbers(dataset, path, length(dataset, path, most_samples));
+  }
+  /// All numbers of a dataset of any shape, the last index running fastest.
+  [[nodiscard]] std::vector<double> field(const std::string& path) const {
+    const DatasetHandle dataset = open_dataset(path);
+    const SpaceHandle space(H5Dget_space(dataset.get()));
+    const hssize_t count = H5Sget_simple_extent_npoints(space.get());
+    if (count < 0 || static_cast<hsize_t>(count) > most_samples)
+      fail("dataset " + path, fmt::format("claims {} numbers", count));
+    return read_numbers(dataset, path, static_cast<size_t>(count));
   }
   /// The same, read when it is asked for; stays readable without this object.
   [[nodiscard]] Series series(const std::string& path) const {
@@ -96,7 +104,7 @@ class H5Source {
         throw InputError({name, "dataset " + path, "cannot be read; the file is damaged", ""});
       }
     };
-    return {length(*dataset, path), read};
+    return {length(*dataset, path, most_samples), read};
   }
   /// A dataset that holds one number, or one text.
   [[nodiscard]] double scalar(const std::string& path) const {
@@ -176,8 +184,10 @@ class H5Source {
   [[nodiscard]] const std::string& file() const { return name_; }
 
  private:
-  // Larger claims are a damaged header, not a recording.
-  static constexpr hsize_t most_elements = hsize_t{1} << 27;
+  // Larger claims are a damaged header, not a recording: three hours at 10 kHz; of what is listed beside it 50 each second.
+  static constexpr hsize_t most_samples = hsize_t{1} << 27, most_rows = hsize_t{1} << 19;
+  /// The library's own choice is a megabyte at most, the daemon's 32 KB.
+  static constexpr uint64_t most_chunk_bytes = uint64_t{16} << 20;
   static constexpr size_t most_text_bytes = size_t{1} << 28;
   /// Deflate makes 1032 bytes of one at best (zlib's technical notes), and a chunk of a few bytes has its ends besides.
   static constexpr uint64_t most_inflation = 1100;
@@ -298,6 +308,24 @@ class H5Source {
            fmt::format("claims {} values of {} bytes each, and the file holds {} bytes of them", values,
                        value_bytes, stored_bytes),
            tampered);
+    std::array<hsize_t, H5S_MAX_RANK> chunk{};
+    const int ranks = layout == H5D_CHUNKED ? H5Pget_chunk(made.get(), H5S_MAX_RANK, chunk.data()) : 0;
+    uint64_t chunk_bytes = ranks > 0 && H5Pget_nfilters(made.get()) > 0 ? value_bytes : 0;
+    for (int i = 0; i < ranks; ++i)  // a chunk has less than 2^32 values, by its format
+      chunk_bytes *= chunk[static_cast<size_t>(i)];
+    if (chunk_bytes > most_chunk_bytes)
+      fail("dataset " + path, fmt::format("is packed in chunks of {} bytes", chunk_bytes),
+           "Pack it in chunks of a megabyte or less: h5repack -l CHUNK=131072.");
+  }
+  [[nodiscard]] std::vector<double> read_numbers(const DatasetHandle& dataset, const std::string& path,
+                                                 size_t count) const {
+    if (!is_number(TypeHandle(H5Dget_type(dataset.get())))) fail("dataset " + path, "does not hold numbers");
+    std::vector<double> values(count);
+    if (!values.empty() &&
+        H5Dread(dataset.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
+      fail("dataset " + path, "cannot be read; the file is damaged");
+    }
+    return values;
   }
   /// Memory for texts of variable length. They are stored without compression: together they take no more of it than the file has
   /// bytes, unless many rows share one.
@@ -359,12 +387,12 @@ class H5Source {
     H5Pset_chunk_cache(access.get(), slots, 2 * static_cast<size_t>(rows) * H5Tget_size(type.get()), 1);
     return DatasetHandle(H5Dopen2(file_.get(), path.c_str(), access.get()));
   }
-  [[nodiscard]] size_t length(const DatasetHandle& dataset, const std::string& path) const {
+  [[nodiscard]] size_t length(const DatasetHandle& dataset, const std::string& path, hsize_t most) const {
     const SpaceHandle space(H5Dget_space(dataset.get()));
     hsize_t rows = 0;
     if (H5Sget_simple_extent_ndims(space.get()) != 1) fail("dataset " + path, "is not one-dimensional");
     H5Sget_simple_extent_dims(space.get(), &rows, nullptr);
-    if (rows > most_elements) fail("dataset " + path, fmt::format("claims {} rows", rows));
+    if (rows > most) fail("dataset " + path, fmt::format("claims {} rows", rows));
     return static_cast<size_t>(rows);
   }
   /// To convert rows HDF5 takes and clears a buffer of a megabyte, each time, unless it is told of a smaller one: more work than
@@ -388,7 +416,7 @@ class H5Source {
     const int member = H5Tget_member_index(row.get(), column.c_str());
     if (member < 0) fail("dataset " + table, fmt::format("has no column {}", column));
     opened.type = TypeHandle(H5Tget_member_type(row.get(), static_cast<unsigned>(member)));
-    opened.rows = length(opened.table, table);
+    opened.rows = length(opened.table, table, most_rows);
     return opened;
   }
   template <typename Number>

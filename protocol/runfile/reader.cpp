@@ -171,11 +171,11 @@ RecordedRun read_without_rows(const H5Source& source) {
 RecordedRun read_run(const std::filesystem::path& path) {
   const H5Source source(path);
   RecordedRun run = read_without_rows(source);
-  run.pump.time_s = source.numbers(pump_time);
-  run.pump.commanded_mL = source.numbers(pump_commanded);
-  run.pressure.time_s = source.numbers(pressure_time);
+  run.pump.time_s = source.samples(pump_time);
+  run.pump.commanded_mL = source.samples(pump_commanded);
+  run.pressure.time_s = source.samples(pressure_time);
   for (auto& [name, values_kPa] : run.pressure.channels)
-    values_kPa = source.numbers(fmt::format("{}/{}", pressure_group, name));
+    values_kPa = source.samples(fmt::format("{}/{}", pressure_group, name));
   check(run);
   return run;
 }

@@ -119,9 +119,15 @@ void look_at_values(const StreamRows& rows, Soundness& soundness) {
       for (const double value_kPa : block)
         watch.push(value_kPa);
     });
+    watch.finish();
     soundness.ranges[name] = {watch.least().value, watch.most().value};
     if (name.ends_with("_filtered_kPa")) continue;
     soundness.saturated[name] = watch.samples();
+    if (watch.stands_still())
+      soundness.problems.push_back(fmt::format(
+          "pressure/{} stands at {:.3f} kPa throughout: nothing is connected, or the pressure was beyond the "
+          "instrument's range",
+          name, watch.most().value));
     for (const signal::Saturated& end : {watch.least(), watch.most()}) {
       if (end.samples == 0) continue;
       soundness.problems.push_back(

@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import zlib
 
 import h5py
 import numpy as np
@@ -65,6 +66,24 @@ def chunks_that_are_not_there(run, place):
     del run["pressure/time_s"]
     run.create_dataset("pressure/time_s", (HUGE,), "f8", chunks=(4096,), compression="gzip", shuffle=True)
     return "dataset /pressure/time_s"
+
+
+def one_chunk_that_unpacks_to_much(run, place):
+    values = run["pressure/cavity_kPa"][:]
+    del run["pressure/cavity_kPa"]
+    data = run.create_dataset("pressure/cavity_kPa", values.shape, "f8", maxshape=(None,), chunks=(60_000_000,), compression="gzip")
+    data.attrs["units"] = "kPa"
+    data.id.write_direct_chunk((0,), zlib.compress(values.tobytes() + bytes(8 * (60_000_000 - len(values))), 1))
+    return "dataset /pressure/cavity_kPa: is packed in chunks of 480000000 bytes"
+
+
+def more_triggers_than_any_recording_has(run, place):
+    del run["trigger/time_s"]
+    data = run.create_dataset("trigger/time_s", (HUGE,), "f8", chunks=(1 << 20,), compression="gzip")
+    chunk = zlib.compress(bytes(8 << 20), 1)
+    for first in range(0, HUGE, 1 << 20):
+        data.id.write_direct_chunk((first,), chunk)
+    return "dataset /trigger/time_s: claims 100000000 rows"
 
 
 def table_that_is_not_there(run, place):
@@ -126,7 +145,7 @@ def after(file, tampered):
 
 
 HOSTILE = [external_link, external_group, user_defined_link, external_storage, virtual_dataset, rows_that_are_not_there,
-           chunks_that_are_not_there, table_that_is_not_there, one_text_many_times, text_of_a_fixed_length,
+           chunks_that_are_not_there, one_chunk_that_unpacks_to_much, more_triggers_than_any_recording_has, table_that_is_not_there, one_text_many_times, text_of_a_fixed_length,
            set_of_numbers_in_two_dimensions, a_type_of_its_own]
 
 

@@ -4,10 +4,9 @@
 #include <fmt/format.h>
 
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <span>
 
+#include "protocol/contract/bounded_file.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
@@ -21,14 +20,11 @@ constexpr uint32_t ram_first = 0x1000'0000, ram_last = 0x2fff'ffff;
 }
 
 std::vector<uint8_t> read_bytes(const std::string& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::vector<uint8_t> bytes{std::istreambuf_iterator<char>(stream), {}};
-  if (bytes.empty()) {
-    refuse(file, "cannot be read or is empty",
-           "Give an image, such as build/firmware/bin/diastole-stm32f405.bin (cmake --preset firmware builds "
-           "it).");
-  }
-  return bytes;
+  const std::string remedy =
+      "Give an image, such as build/firmware/bin/diastole-stm32f405.bin (cmake --preset firmware builds it).";
+  const std::string bytes = read_bounded_file(file, most_table_bytes, remedy);
+  if (bytes.empty()) refuse(file, "is empty", remedy);
+  return {bytes.begin(), bytes.end()};
 }
 
 /// A structure at `offset`; refuses files that end before it does.

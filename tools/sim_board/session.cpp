@@ -9,10 +9,10 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "protocol/contract/bounded_file.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/json_text.hpp"
 #include "tools/sim_board/emulated_controller.hpp"
@@ -33,9 +33,9 @@ uint64_t nanoseconds(double time_s) { return static_cast<uint64_t>(time_s * 1e9 
 
 /// The flash's content from the last session, when there is one; it wins over the images.
 void restore_flash(SimBoard& board, const std::string& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) return;
-  const std::vector<uint8_t> bytes{std::istreambuf_iterator<char>(stream), {}};
+  if (!std::ifstream(file)) return;
+  const std::string content = read_bounded_file(file, most_table_bytes);
+  const std::vector<uint8_t> bytes(content.begin(), content.end());
   if (bytes.size() != board.flash().size()) {
     throw InputError(
         {file, "",

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "protocol/contract/table_reader.hpp"
 
 namespace diastole::imaging {
@@ -29,7 +30,9 @@ class EditLine {
 
   void parse(const std::string& text) {
     try {
-      json_ = Json::parse(text);
+      json_ = Json::parse(text, no_deeper_than<Json>());
+    } catch (const JsonTooDeep& error) {
+      refuse(fmt::format("is {}", error.what()), "A line is one choice, with lists of points in it.");
     } catch (const Json::exception&) {
       refuse(fmt::format("is no JSON: {}", text.size() > 60 ? text.substr(0, 60) + "..." : text),
              "A line is one choice, {\"slice\": ..., \"phase\": ..., \"action\": ..., \"points\": [[column, "

@@ -150,7 +150,7 @@ TEST(Grids, XdmfThereAndBackToTheLastBit) {
               HasSubstr("\n0,0,0,0\n1,0.25,1,0\n2,0.5,2,0\n"));
   std::filesystem::remove(folder.path() / "a.h5");
   EXPECT_THAT(message_of([&] { (void)read_grid((folder.path() / "a.xdmf").string()); }),
-              HasSubstr("a.h5 cannot be opened"));
+              HasSubstr("a.h5: cannot be opened"));
 }
 
 std::string vtu_with(const std::string& attributes, const std::string& points,

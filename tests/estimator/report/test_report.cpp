@@ -90,6 +90,9 @@ TEST(FitFile, JunkIsRefusedWithItsReason) {
   EXPECT_THAT(fault("[]"), HasSubstr("key format"));
   EXPECT_THAT(fault(R"({"format": 7})"), HasSubstr("fit.json"));
   EXPECT_THAT(fault(R"({"format": "diastole-fit", "format_version": 2})"), HasSubstr("newer"));
+  constexpr size_t deep = 150'000;
+  EXPECT_THAT(fault(R"({"format": "diastole-fit", "warnings": )" + std::string(deep, '[')),
+              HasSubstr("nested more than 64 levels deep"));
   std::string cut = to_json(gel_fit());
   cut.replace(cut.find("\"rms_mm\""), 8, "\"rms\"");
   EXPECT_THAT(fault(cut), HasSubstr("rms_mm"));

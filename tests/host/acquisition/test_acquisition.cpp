@@ -1,14 +1,18 @@
 #include "host/acquisition/acquisition.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
+#include <random>
 
 #include "protocol/runfile/frame_bins.hpp"
 #include "protocol/runfile/reader.hpp"
 #include "protocol/runfile/soundness.hpp"
+#include "protocol/signal/saturation.hpp"
 #include "tests/host/acquisition/session_on_desk.hpp"
 
 namespace diastole {
@@ -82,6 +86,33 @@ TEST(Acquisition, FailedReadingsAreCountedExactlyAndNeverInterpolated) {
   EXPECT_EQ(assembled.run.gaps[0].count, 7);
   EXPECT_EQ(assembled.run.gaps[0].reason, "no answer");
   EXPECT_FALSE(runfile::assess(assembled.run).sound());
+}
+
+/// Waves of 6 V at 5 Hz, which the instrument shows in millivolts up to 5 V, with a flicker of one.
+TEST(Acquisition, SamplesBeyondTheInstrumentsRangeAreToldAtOnceAndCounted) {
+  SessionOnDesk session(short_session);
+  std::mt19937 random(5);
+  session.instrument.volts_at = [&](double time_s) {
+    const double flicker = 1e-3 * static_cast<double>(random() % 2);
+    const double volts = std::round(6000.0 * std::sin(2.0 * std::numbers::pi * 5.0 * time_s)) / 1000.0;
+    return std::clamp(volts + flicker, -5.0, 5.0);
+  };
+  session.run();
+  const RecordedRun run = session.assemble().run;
+  const auto& cavity = run.pressure.channels.at("cavity_kPa");
+  const double least = std::ranges::min(cavity), most = std::ranges::max(cavity);
+  const auto at_the_end =
+      std::ranges::count_if(cavity, [&](double value) { return value == least || value == most; });
+  EXPECT_GT(at_the_end, 100);
+  const auto saturated = static_cast<int64_t>(session.outcome.counts.saturated);
+  EXPECT_LE(saturated, at_the_end);
+  EXPECT_GT(saturated, at_the_end - signal::SaturationWatch::kLeastRun) << "all but where the recording ends";
+  EXPECT_EQ(runfile::assess(run).saturated.at("cavity_kPa"), saturated);
+  const auto told = std::ranges::find(session.remarks, "saturated", &RunRemark::code);
+  ASSERT_NE(told, session.remarks.end());
+  EXPECT_EQ(told->level, "warning");
+  EXPECT_THAT(session.remarks.back().text,
+              testing::HasSubstr(fmt::format("{} samples of cavity", saturated)));
 }
 
 /// A journal that ends before its record number `records`, as that of a daemon that was killed.

@@ -31,7 +31,7 @@ size_t DeskLine::read(std::span<uint8_t> out) {
 daq::Outcome DeskInstrument::read(std::span<double> volts) {
   const uint64_t reading = readings++;
   desk_.advance_to(desk_.now_ns + delay_ns(reading));
-  volts[0] = 0.5 + 1e-10 * static_cast<double>(desk_.now_ns);
+  volts[0] = volts_at(1e-9 * static_cast<double>(desk_.now_ns));
   return fault(reading);
 }
 

@@ -73,6 +73,7 @@ class DeskInstrument final : public daq::PolledInstrument {
   uint64_t readings = 0;
   std::function<daq::Outcome(uint64_t reading)> fault = [](uint64_t) { return daq::Outcome{}; };
   std::function<uint64_t(uint64_t reading)> delay_ns = [](uint64_t) { return uint64_t{0}; };
+  std::function<double(double time_s)> volts_at = [](double time_s) { return 0.5 + 0.1 * time_s; };
   double clock_error_ppm = 0;
 
  private:

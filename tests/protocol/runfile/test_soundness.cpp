@@ -222,6 +222,38 @@ TEST(Saturation, IsCountedByChannelAndMakesARunUnsound) {
               testing::ElementsAre(HasSubstr("pressure/pump_kPa: "), HasSubstr("100.000 kPa")));
 }
 
+/// What the recording, or a gap, cuts off has one side to be known by.
+TEST(Saturation, IsCountedWhereTheRecordingBeginsOrEndsInIt) {
+  constexpr std::ptrdiff_t cut_off = 150;
+  for (const bool at_the_begin : {true, false}) {
+    RecordedRun run = regular_run();
+    std::vector<double> values = measured(60);
+    std::fill_n(at_the_begin ? values.begin() : values.end() - cut_off, cut_off, 100.0);
+    run.pressure.channels["cavity_kPa"] = values;
+    EXPECT_EQ(assess(run).saturated.at("cavity_kPa"), cut_off) << at_the_begin;
+  }
+  RecordedRun run = regular_run();
+  std::vector<double> values = measured(127);
+  const auto whole = std::ranges::count_if(values, [](double value) { return std::abs(value) == 100; });
+  const auto beyond = std::ranges::find(values, 100.0);
+  ASSERT_EQ(beyond[signal::SaturationWatch::kLeastRun], 100.0);
+  *beyond = std::nan("");
+  run.gaps = {{"pressure", beyond - values.begin(), 1, "no answer"}};
+  run.pressure.channels["cavity_kPa"] = values;
+  EXPECT_EQ(assess(run).saturated.at("cavity_kPa"), whole - 1);
+}
+
+TEST(Saturation, AChannelThatShowsOneValueIsNotSound) {
+  RecordedRun run = regular_run();
+  auto& cavity_kPa = run.pressure.channels["cavity_kPa"];
+  EXPECT_THAT(assess(run).problems, testing::Not(testing::Contains(HasSubstr("throughout"))));
+  while (cavity_kPa.size() < signal::SaturationWatch::kLeastStill) {
+    cavity_kPa.push_back(1);
+    run.pressure.time_s.push_back(0.01 * static_cast<double>(run.pressure.time_s.size()));
+  }
+  EXPECT_THAT(assess(run).problems, testing::Contains(HasSubstr("stands at 1.000 kPa throughout")));
+}
+
 /// Just beyond the end a wave rises by half a kilopascal a sample, of which the end leaves whatever part: by the last step alone,
 /// two peaks in three would be missed.
 TEST(Saturation, IsSeenWhereverTheEndCutsTheLastStep) {

@@ -47,7 +47,11 @@ int64_t mtime_ns(const fs::path& path) {
 
 json read_json_file(const fs::path& file) {
   if (!fs::exists(file)) return {};
-  return json::parse(read_whole_file(file), nullptr, false);
+  try {
+    return json::parse(read_whole_file(file), no_deeper_than<json>(), false);
+  } catch (const JsonTooDeep&) {
+    return json::value_t::discarded;
+  }
 }
 
 std::string fit_words(const json& document) {

@@ -68,7 +68,10 @@ std::string DeskSession::file_text() const {
 void DeskSession::append(const std::string& choice) {
   std::string line;
   try {
-    line = json_text(json::parse(choice));  // on one line, whatever came
+    line = json_text(json::parse(choice, no_deeper_than<json>()));  // on one line, whatever came
+  } catch (const JsonTooDeep& error) {
+    throw InputError({edits_file().string(), "", fmt::format("the choice is {}", error.what()),
+                      "Send one object with a list of points."});
   } catch (const json::exception&) {
     throw InputError(
         {edits_file().string(), "", "the choice is no JSON: " + choice.substr(0, 60), "Send one object."});

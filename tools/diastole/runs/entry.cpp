@@ -18,7 +18,9 @@
 #include "estimator/explain/verdict/explanation_json.hpp"
 #include "estimator/io/fit_file.hpp"
 #include "estimator/io/whole_file.hpp"
+#include "protocol/contract/bounded_file.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "protocol/runfile/h5_source.hpp"
 #include "protocol/runfile/layout.hpp"
 #include "protocol/runfile/reader.hpp"
@@ -95,6 +97,7 @@ json record_of(const fs::path& file) {
   static const std::set<std::string, std::less<>> bulk{"traces", "field", "sections", "history", "residuals"};
   bool skips = false;
   return json::parse(read_whole_file(file), [&](int depth, json::parse_event_t event, json& parsed) {
+    if (depth > deepest_json) throw JsonTooDeep(deepest_json);
     if (event == json::parse_event_t::key && depth == 1)
       skips = bulk.contains(parsed.get_ref<const std::string&>());
     return !(skips && depth > 0 && event != json::parse_event_t::object_end);
@@ -122,7 +125,7 @@ std::optional<fs::path> find_study(const fs::path& folder, const fs::path& recor
 std::vector<std::string> runs_of(const fs::path& folder, const fs::path& study) {
   std::vector<std::string> runs;
   try {
-    const toml::table table = toml::parse_file(study.string());
+    const toml::table table = toml::parse(read_bounded_file(study, most_settings_bytes));
     const toml::array* listed = table["data"]["runs"].as_array();
     if (listed == nullptr) return runs;
     for (const toml::node& run : *listed) {
@@ -130,6 +133,8 @@ std::vector<std::string> runs_of(const fs::path& folder, const fs::path& study) 
         runs.push_back(relative_to(folder, (study.parent_path() / *name).lexically_normal()));
     }
   } catch (const toml::parse_error&) {
+    runs.clear();
+  } catch (const InputError&) {
     runs.clear();
   }
   return runs;
