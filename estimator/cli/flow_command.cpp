@@ -201,7 +201,8 @@ void add_flow(CommandLine& line) {
       "  diastole flow dicom/ -o heart.flow.csv --pressure p.csv --trigger t.csv --loop heart.loop.csv\n"
       "      the same with tables time_s,cavity_kPa and time_s\n"
       "  diastole flow dicom/ -o heart.flow.csv --venc 100 --centre 52,47 --json\n"
-      "Flow is positive along the slice's normal (rows x columns). docs/flow.md says how it is measured.");
+      "Flow is positive along the slice's normal (rows x columns), or against it with --reverse. "
+      "docs/flow.md says how it is measured.");
   FlowArguments& a = *arguments;
   imaging::FlowSessionRequest& session = a.session;
   command->add_option("FOLDER", session.folder, "the folder with the scanner's files")->required();
@@ -235,6 +236,8 @@ void add_flow(CommandLine& line) {
       ->delimiter(',')
       ->expected(2);
   command->add_flag("--bridge-gaps", session.scan.bridge_gaps, "go across phases that are missing");
+  command->add_flag("--reverse", session.scan.reverse,
+                    "the slice's normal points out of the specimen: count flow against it as positive");
   command->add_flag("--leave-background", a.leave_background,
                     "do not take off the phase that still material shows");
   command->add_flag("--close", session.flow.close,

@@ -47,8 +47,8 @@ void summarise(FibreSession& session, const std::vector<const VoxelTensor*>& vox
                                             "{:.3f}",
                                             session.fa, session.fa_of_noise),
                                 session.series.name, session.fa, "",
-                                "An isotropic material shows this; its true FA is near zero. First "
-                                "eigenvectors mean nothing here."});
+                                "An isotropic material shows this; its true FA is near zero. The first "
+                                "eigenvector of a single voxel means nothing here."});
   if (session.tensors.sigma == 0)
     session.findings.push_back(
         {Severity::note, "noise-unknown",

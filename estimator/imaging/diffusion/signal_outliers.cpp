@@ -24,6 +24,13 @@ constexpr size_t least_bright_voxels = 20;
 constexpr double brighter_than_noise = 5;    ///< without weighting: air of a slice beside the specimen goes
 constexpr double predicted_above_noise = 3;  ///< below, magnitudes are more than the signal by 5 % and more
 
+constexpr size_t least_in_shell = 5;  ///< of fewer, one that is off moves the middle
+
+/// Gradients err by a few per cent, and those of imaging weight a little where none is asked for.
+bool is_one_shell(double a_s_mm2, double b_s_mm2) {
+  return std::abs(a_s_mm2 - b_s_mm2) <= std::max(0.05 * b_s_mm2, 20.0);
+}
+
 /// The voxels of a slice that are brighter than noise, every so many: signals by volume.
 struct SliceSignals {
   std::vector<size_t> volumes;
@@ -64,15 +71,15 @@ SliceSignals signals_of(const DiffusionSeries& series, size_t slice) {
   return signals;
 }
 
-struct Gain {
-  size_t position;  ///< among the slice's volumes
-  double log_gain;
+struct LogGain {
+  double middle, error;
 };
 
-/// The image that its siblings predict worst, if it is one.
-std::optional<Gain> worst(const DiffusionSeries& series, const SliceSignals& signals) {
+/// Of each of the slice's images beside what the others predict; nothing where they predict nothing.
+std::vector<std::optional<LogGain>> gains_of(const DiffusionSeries& series, const SliceSignals& signals) {
+  std::vector<std::optional<LogGain>> gains(signals.volumes.size());
   const TensorDesign design = tensor_design(series, signals.volumes);
-  if (design.rows() <= tensor_unknowns || signals.voxels.size() < least_bright_voxels) return std::nullopt;
+  if (design.rows() <= tensor_unknowns || signals.voxels.size() < least_bright_voxels) return gains;
   const TensorSolver solver(design);
   std::vector<TensorSolution> fits;
   std::vector<double> variances;
@@ -82,7 +89,6 @@ std::optional<Gain> worst(const DiffusionSeries& series, const SliceSignals& sig
                         static_cast<double>(design.rows() - tensor_unknowns));
   }
   const double sigma = std::sqrt(signal::median(std::move(variances)));
-  std::optional<Gain> found;
   for (size_t i = 0; i < signals.volumes.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
     std::vector<double> logs;
@@ -99,9 +105,37 @@ std::optional<Gain> worst(const DiffusionSeries& series, const SliceSignals& sig
     for (double& value : logs)
       value = std::abs(value - middle);
     // Of a normal sample: 1.4826 MAD is its sigma, 1.25 sigma / sqrt(n) the median's error.
-    const double error = 1.25 * 1.4826 * signal::median(std::move(logs)) / std::sqrt(count);
-    if (std::abs(middle) < std::max(least_log_gain, least_sigmas * error)) continue;
-    if (!found || std::abs(middle) > std::abs(found->log_gain)) found = Gain{i, middle};
+    gains[i] = {middle, 1.25 * 1.4826 * signal::median(std::move(logs)) / std::sqrt(count)};
+  }
+  return gains;
+}
+
+/// The images of about one b value, of those that are predicted; nothing where they are too few to have a middle.
+std::optional<double> shell_gain(const DiffusionSeries& series, const SliceSignals& signals,
+                                 const std::vector<std::optional<LogGain>>& gains, double b_s_mm2) {
+  std::vector<double> shell;
+  for (size_t i = 0; i < gains.size(); ++i)
+    if (gains[i] && is_one_shell(series.volumes[signals.volumes[i]].b_s_mm2(), b_s_mm2))
+      shell.push_back(gains[i]->middle);
+  return shell.size() >= least_in_shell ? std::optional(signal::median(std::move(shell))) : std::nullopt;
+}
+
+struct Outlier {
+  size_t position;  ///< among the slice's volumes
+  double log_gain;
+};
+
+/// The image that its siblings predict worst, if it is one. A whole shell may be off: tissue's signal is no exponential of b, and its
+/// floor is noise; its images are held against each other.
+std::optional<Outlier> worst(const DiffusionSeries& series, const SliceSignals& signals) {
+  const std::vector<std::optional<LogGain>> gains = gains_of(series, signals);
+  std::optional<Outlier> found;
+  for (size_t i = 0; i < gains.size(); ++i) {
+    if (!gains[i]) continue;
+    const double b_s_mm2 = series.volumes[signals.volumes[i]].b_s_mm2();
+    const double apart = gains[i]->middle - shell_gain(series, signals, gains, b_s_mm2).value_or(0.0);
+    if (std::abs(apart) < std::max(least_log_gain, least_sigmas * gains[i]->error)) continue;
+    if (!found || std::abs(apart) > std::abs(found->log_gain)) found = Outlier{i, apart};
   }
   return found;
 }
@@ -116,11 +150,16 @@ void drop(SliceSignals& signals, size_t position) {
   }
 }
 
-std::vector<SignalOutlier> outliers_of(const DiffusionSeries& series, size_t slice,
-                                       const std::string& folder) {
+struct SliceOutliers {
+  std::vector<SignalOutlier> outliers;
+  std::map<double, double> shells;  ///< log gain of the images of each b value that are sound, by s/mm2
+};
+
+SliceOutliers outliers_of(const DiffusionSeries& series, size_t slice, const std::string& folder) {
   SliceSignals signals = signals_of(series, slice);
   const size_t all = signals.volumes.size();
-  std::vector<SignalOutlier> outliers;
+  SliceOutliers of_slice;
+  std::vector<SignalOutlier>& outliers = of_slice.outliers;
   while (const auto found = worst(series, signals)) {
     outliers.push_back({signals.volumes[found->position], slice, std::exp(found->log_gain)});
     if (3 * outliers.size() > all)
@@ -136,7 +175,38 @@ std::vector<SignalOutlier> outliers_of(const DiffusionSeries& series, size_t sli
                        series.volumes[outliers.back().volume].name(), 100 * (1 - outliers.back().gain)),
            "Acquire the series again, or keep it with --keep-outliers."});
   }
-  return outliers;
+  const std::vector<std::optional<LogGain>> gains = gains_of(series, signals);
+  for (const size_t v : signals.volumes) {
+    const double b_s_mm2 = series.volumes[v].b_s_mm2();
+    const auto known = std::ranges::find_if(
+        of_slice.shells, [&](const auto& shell) { return is_one_shell(shell.first, b_s_mm2); });
+    if (known != of_slice.shells.end()) continue;
+    if (const auto gain = shell_gain(series, signals, gains, b_s_mm2)) of_slice.shells[b_s_mm2] = *gain;
+  }
+  return of_slice;
+}
+
+/// Of b values whose images a tensor does not explain as a whole, in most slices that tell.
+void add_shell_findings(DiffusionSeries& series, const std::vector<SliceOutliers>& slices) {
+  std::map<double, std::vector<double>> gains;
+  for (const SliceOutliers& slice : slices)
+    for (const auto& [b_s_mm2, gain] : slice.shells) {
+      const auto known = std::ranges::find_if(
+          gains, [&, b = b_s_mm2](const auto& shell) { return is_one_shell(shell.first, b); });
+      (known == gains.end() ? gains[b_s_mm2] : known->second).push_back(gain);
+    }
+  for (auto& [b_s_mm2, of_shell] : gains) {
+    const double gain = std::exp(signal::median(std::move(of_shell)));
+    if (std::abs(std::log(gain)) < least_log_gain) continue;
+    series.findings.push_back(
+        {Severity::warning, "shell-misfit",
+         fmt::format("the images of b {:.0f} have {:.0f} % of the signal that a tensor through all b values "
+                     "allows them",
+                     b_s_mm2, 100 * gain),
+         series.name, gain, "",
+         "Diffusion in tissue is slower at large b, and noise has a floor: directions stay, FA and MD are "
+         "biased. Leave the largest b values away for these."});
+  }
 }
 
 std::string range_of(const std::vector<size_t>& slices, size_t all) {
@@ -150,12 +220,13 @@ std::string range_of(const std::vector<size_t>& slices, size_t all) {
 }  // namespace
 
 std::vector<SignalOutlier> remove_outliers(DiffusionSeries& series, const std::string& folder) {
-  std::vector<std::vector<SignalOutlier>> found(series.slices.size());
+  std::vector<SliceOutliers> found(series.slices.size());
   parallel_for(found.size(), machine_threads(),
                [&](size_t slice) { found[slice] = outliers_of(series, slice, folder); });
   std::vector<SignalOutlier> all;
-  for (const auto& of_slice : found)
-    all.insert(all.end(), of_slice.begin(), of_slice.end());
+  for (const SliceOutliers& of_slice : found)
+    all.insert(all.end(), of_slice.outliers.begin(), of_slice.outliers.end());
+  add_shell_findings(series, found);
   std::sort(all.begin(), all.end(), [](const SignalOutlier& a, const SignalOutlier& b) {
     return std::pair(a.volume, a.slice) < std::pair(b.volume, b.slice);
   });

@@ -1,6 +1,7 @@
 #pragma once
 // Images that lost signal, or gained some: motion during a readout, a spike, a scaling that changed. Every image of a slice is predicted from the
-// tensors of the slice's other images; the median over voxels of its log signal minus the prediction is the log of its gain.
+// tensors of the slice's other images; the median over voxels of its log signal minus the prediction is the log of its gain. Images of one b value
+// are held against their middle, which kurtosis and the floor of noise move away from what a tensor predicts: that is a finding of its own.
 
 #include <vector>
 

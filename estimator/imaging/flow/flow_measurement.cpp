@@ -276,6 +276,7 @@ ValueWithError FlowMeasurement::volume_at(double time_s) const {
 FlowMeasurement measure_flow(PhaseContrast scan, const FlowRequest& request, const std::string& folder) {
   FlowMeasurement flow;
   flow.scan = std::move(scan);
+  flow.findings = flow.scan.findings;
   const SlicePlane& plane = flow.scan.plane;
   const MotionMap map = motion_map(flow.scan);
   const std::vector<MovingRegion> regions = moving_regions(map);

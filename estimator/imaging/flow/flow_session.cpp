@@ -98,7 +98,10 @@ FlowSession measure_session(const FlowSessionRequest& request, const Stage& stag
   say(fmt::format("Fitting the lumen of {} in {} phases.", scan.name, scan.phases()));
   session.flow = measure_flow(std::move(scan), request.flow, session.folder);
   session.findings.insert(session.findings.end(), session.flow.findings.begin(), session.flow.findings.end());
-  if (run) session.loop = pressure_volume_loop(session.flow, *run, request.segment);
+  if (!run) return session;
+  session.loop = pressure_volume_loop(session.flow, *run, request.segment);
+  session.findings.insert(session.findings.end(), session.loop->findings.begin(),
+                          session.loop->findings.end());
   return session;
 }
 

@@ -149,6 +149,50 @@ void require_phases(const ImageFolder& folder, const ImageSeries& series, const 
            "Export the series again; or --bridge-gaps goes across, with the larger error that this costs.");
 }
 
+/// The venc that the headers state; nothing if none.
+std::optional<double> stated_venc(const ImageHeader& header, const std::string& file) {
+  try {
+    return velocity_scale(header, {}, {}, file).venc_cm_s;
+  } catch (const InputError&) {
+    return {};
+  }
+}
+
+/// What was asked for is taken, and said to differ where it does: a slip of a finger scales every flow.
+void add_contradictions(PhaseContrast& scan, const PhaseContrastRequest& request, const ImageHeader& header,
+                        std::optional<double> interval_ms, const std::string& file) {
+  constexpr double differs = 0.02;
+  const auto add = [&](const char* id, std::string what, double number, const char* unit,
+                       const char* remedy) {
+    scan.findings.push_back({Severity::warning, id, std::move(what), scan.name, number, unit, remedy});
+  };
+  const std::optional<double> venc = request.venc_cm_s ? stated_venc(header, file) : std::nullopt;
+  if (venc && std::abs(scan.venc_cm_s / *venc - 1) > differs)
+    add("venc-contradicted",
+        fmt::format(
+            "--venc {:g} contradicts the headers, which state {:g} cm/s: all flow is in proportion to it",
+            scan.venc_cm_s, *venc),
+        *venc, "cm/s", "Leave --venc away unless the headers are known to be wrong.");
+  if (request.interval_s && interval_ms) {
+    const double cycles = scan.interval_s / (1e-3 * *interval_ms);
+    const double whole = std::max(1.0, std::round(cycles));
+    if (std::abs(cycles / whole - 1) > differs)
+      add("period-contradicted",
+          fmt::format(
+              "--period {:g} is {:.2f} of the headers' intervals of {:g} s, and no whole number of them",
+              scan.interval_s, cycles, 1e-3 * *interval_ms),
+          1e-3 * *interval_ms, "s", "Leave --period away unless the headers are known to be wrong.");
+  }
+  // Gating leaves out up to a tenth of a cycle; what lies further beyond the last image is a guess.
+  const double unseen_s = scan.interval_s - (scan.time_s.back() - scan.time_s.front());
+  const double step_s = (scan.time_s.back() - scan.time_s.front()) / static_cast<double>(scan.phases() - 1);
+  if (unseen_s > 3.0 * step_s && unseen_s > 0.2 * scan.interval_s)
+    add("cycle-not-seen",
+        fmt::format("no image shows {:.2f} s of the cycle's {:.2f} s: the volume there is a guess", unseen_s,
+                    scan.interval_s),
+        unseen_s, "s", "Check the cycle's length (--period), or export all phases.");
+}
+
 }  // namespace
 
 double PhaseContrast::cm_s_per_radian() const { return venc_cm_s / std::numbers::pi; }
@@ -175,7 +219,7 @@ PhaseContrast phase_contrast(const ImageFolder& folder, const PhaseContrastReque
   scan.venc_cm_s = scale.venc_cm_s;
   scan.venc_source = scale.source;
   for (Image& image : scan.phase_rad)
-    image *= static_cast<float>(scale.radians_per_unit);
+    image *= static_cast<float>(request.reverse ? -scale.radians_per_unit : scale.radians_per_unit);
 
   const double span_s = scan.time_s.back() - scan.time_s.front();
   if (request.interval_s) {
@@ -194,6 +238,7 @@ PhaseContrast phase_contrast(const ImageFolder& folder, const PhaseContrastReque
                        scan.interval_s, span_s),
            "Give the time after which the flow repeats with --period; gated on every second R-wave it is two "
            "cycles.");
+  add_contradictions(scan, request, folder.images[slice.images[0]].header, series.interval_ms, file);
   return scan;
 }
 

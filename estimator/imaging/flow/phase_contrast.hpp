@@ -15,6 +15,7 @@ struct PhaseContrastRequest {
   std::optional<size_t> slice = {};       ///< from 1, where the series has several
   std::optional<double> interval_s = {};  ///< after which the flow repeats, instead of the headers'
   bool bridge_gaps = false;               ///< go across phases that are missing
+  bool reverse = false;                   ///< the slice's normal points out of the specimen
 };
 
 struct PhaseContrast {
@@ -26,7 +27,9 @@ struct PhaseContrast {
   double venc_cm_s = 0;
   std::string venc_source;
   std::vector<Image> magnitude;
-  std::vector<Image> phase_rad;  ///< within half a turn; positive along the slice's normal
+  std::vector<Image>
+      phase_rad;  ///< within half a turn; positive along the slice's normal, or against it if asked
+  std::vector<Finding> findings;  ///< what is asked and what headers say differ
 
   [[nodiscard]] size_t phases() const { return time_s.size(); }
   [[nodiscard]] double cm_s_per_radian() const;

@@ -9,6 +9,7 @@
 
 #include "estimator/io/number_table.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/runfile/commanded_volume.hpp"
 #include "protocol/runfile/frame_bins.hpp"
 #include "protocol/runfile/signal_delay.hpp"
 #include "protocol/signal/median.hpp"
@@ -52,6 +53,62 @@ ValueWithError work_of(const PeriodicCurve& flow, const PeriodicCurve& pressure)
     by_pressure += step_s * flow.of(flow_row) * pressure_row;
   }
   return {flow.of(by_flow), std::hypot(flow.sigma_of(by_flow), pressure.sigma_of(by_pressure))};
+}
+
+double correlation(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+  const Eigen::VectorXd da = a.array() - a.mean(), db = b.array() - b.mean();
+  const double size = da.norm() * db.norm();
+  return size > 0 ? da.dot(db) / size : 0.0;
+}
+
+/// What the pump was commanded to at these times of a cycle, mL; empty without a pump's record of a whole one.
+Eigen::VectorXd pumped_mL(const runfile::RunFile& file, size_t segment, const Eigen::VectorXd& time_s) {
+  if (file.rows.pump.time_s.size() == 0) return {};
+  const double start_s = file.run.segments.at(segment).start_s;
+  for (const double trigger_s : file.run.trigger_s) {
+    if (trigger_s < start_s) continue;
+    runfile::CommandedVolume pump(file.rows.pump);
+    const Eigen::VectorXd volume =
+        time_s.unaryExpr([&](double after_s) { return pump.at(trigger_s + after_s); });
+    if (volume.allFinite()) return volume;
+  }
+  return {};
+}
+
+/// Specimens fill with the pump, and their pressure rises with their volume. A slice whose normal points out of them shows the reverse.
+void compare_with_pump(PressureVolumeLoop& loop, const runfile::RunFile& file,
+                       const Eigen::VectorXd& time_s) {
+  constexpr double opposed = -0.5;  // of a correlation: a quarter of a cycle late is none
+  const auto count = static_cast<Eigen::Index>(loop.points.size());
+  Eigen::VectorXd volume(count), pressure(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    volume[i] = loop.points[static_cast<size_t>(i)].volume_mL.value;
+    pressure[i] = loop.points[static_cast<size_t>(i)].pressure_kPa.value;
+  }
+  const char* remedy =
+      "If the slice's normal points out of the specimen, say --reverse; else this is another run's flow.";
+  const Eigen::VectorXd pump = pumped_mL(file, loop.segment, time_s);
+  if (pump.size() > 0) {
+    if (const double with_pump = correlation(volume, pump); with_pump < opposed)
+      throw InputError(
+          {loop.source, fmt::format("segment {}", loop.segment),
+           fmt::format("the measured volume falls while the pump fills (correlation {:.2f})", with_pump),
+           remedy});
+    const double measured_mL = volume.maxCoeff() - volume.minCoeff();
+    const double stroke_mL = pump.maxCoeff() - pump.minCoeff();
+    constexpr double more = 1.1;  // ringing lines overshoot by less
+    if (measured_mL > more * stroke_mL)
+      loop.findings.push_back(
+          {Severity::warning, "more-than-pumped",
+           fmt::format("flow brings {:.1f} mL, and the pump gives {:.1f} mL", measured_mL, stroke_mL),
+           loop.source, measured_mL / stroke_mL, "",
+           "Check that this is the run of the scan, and its segment (--segment); and the venc."});
+  } else if (const double with_pressure = correlation(volume, pressure); with_pressure < opposed) {
+    loop.findings.push_back(
+        {Severity::warning, "pressure-falls",
+         fmt::format("the pressure falls while the volume rises (correlation {:.2f})", with_pressure),
+         loop.source, with_pressure, "", remedy});
+  }
 }
 
 }  // namespace
@@ -138,6 +195,7 @@ PressureVolumeLoop pressure_volume_loop(const FlowMeasurement& flow, const runfi
     loop.points.push_back(point);
   }
   loop.work_mJ = work_of(flow.flow, pressure);
+  compare_with_pump(loop, file, time * (interval_s / flow.interval_s()));
   return loop;
 }
 

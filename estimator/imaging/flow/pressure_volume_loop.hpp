@@ -26,13 +26,15 @@ struct PressureVolumeLoop {
   int64_t gate_every = 1;  ///< cycles of the pump in the images' interval
   size_t cycles = 0;       ///< that the pressure is the mean of
   double delay_s = 0;      ///< of the pressure's signal, taken off
+  std::vector<Finding> findings;
 };
 
 /// A pressure trace `time_s,cavity_kPa` and its triggers `time_s` as a run of one segment. Throws InputError.
 runfile::RecordedRun run_of_tables(const std::filesystem::path& pressure,
                                    const std::filesystem::path& trigger);
 
-/// `segment`: default the first with triggers. Throws InputError if the images' interval is no whole number of the segment's periods, or as bin_frames does.
+/// `segment`: default the first with triggers. Throws InputError if the images' interval is no whole number of the segment's periods, if the
+/// volume falls while the run's pump fills, or as bin_frames does.
 PressureVolumeLoop pressure_volume_loop(const FlowMeasurement& flow, const runfile::RunFile& file,
                                         std::optional<size_t> segment);
 

@@ -38,8 +38,13 @@ struct CineSlice {
   std::string name;
   SlicePlane plane;
   bool is_long = false;
-  std::vector<Eigen::ArrayXXd> images;  // by phase
+  std::vector<Eigen::ArrayXXd> images;  // by phase; without pixels where the slice lacks it
   Levels levels;
+
+  [[nodiscard]] bool has(size_t phase) const { return images[phase].size() > 0; }
+  [[nodiscard]] const Eigen::ArrayXXd& first_image() const {
+    return *std::ranges::find_if(images, [](const Eigen::ArrayXXd& image) { return image.size() > 0; });
+  }
 };
 
 /// In-plane mm, from the first pixel's centre.
@@ -182,12 +187,17 @@ class CineFinder {
   }
 
   GuidePoints found() {
+    std::vector<double> base_mm;
     for (size_t p = 0; p < guide_.phases.size(); ++p) {
       const size_t before = guide_.points.size();
       for (size_t s = 0; s < slices_.size(); ++s)
-        if (slices_[s].is_long) find_long(p, s);
-      find_short(p, base_height_mm(before));
+        if (slices_[s].is_long && slices_[s].has(p)) find_long(p, s);
+      base_mm.push_back(base_height_mm(before));
     }
+    // A phase that no long-axis image shows has its base no lower than any other.
+    const double lowest_mm = std::ranges::min(base_mm);
+    for (size_t p = 0; p < guide_.phases.size(); ++p)
+      find_short(p, std::isfinite(base_mm[p]) ? base_mm[p] : lowest_mm);
     if (guide_.points.empty())
       refuse("no wall around blood is seen",
              "Give bright-blood cines of a ventricle, or set guide points by hand.");
@@ -201,35 +211,60 @@ class CineFinder {
 
   /// Of the cine slices: phase contrast's magnitudes, one slice of more phases, look like a cine.
   static size_t phases_of_most(const ImageFolder& folder) {
-    std::map<size_t, int> slices;
-    for (const ImageSeries& series : folder.series) {
-      if (series.kind != SeriesKind::cine) continue;
-      for (const SliceImages& slice : series.slices)
-        ++slices[slice.images.size()];
-    }
-    const auto most = std::max_element(slices.begin(), slices.end(),
-                                       [](const auto& a, const auto& b) { return a.second < b.second; });
+    std::map<size_t, size_t> slices;
+    for (const ImageSeries& series : folder.series)
+      if (series.kind == SeriesKind::cine) slices[series.phases.times_ms.size()] += series.slices.size();
+    const auto most = std::ranges::max_element(slices, {}, [](const auto& count) { return count.second; });
     return most == slices.end() ? 0 : most->first;
   }
 
+  /// The times that all slices have in common; nothing where their cycles differ.
+  static std::optional<PhaseTimes> times_in_common(const ImageFolder& folder, size_t phases) {
+    std::vector<std::vector<double>> times_ms;
+    for (const ImageSeries& series : folder.series) {
+      if (series.kind != SeriesKind::cine || series.phases.times_ms.size() > phases) continue;
+      for (const SliceImages& slice : series.slices) {
+        if (2 * slice.images.size() <= phases) continue;
+        times_ms.emplace_back();
+        for (const size_t image : slice.images)
+          if (const auto& trigger_ms = folder.images[image].header.trigger_ms)
+            times_ms.back().push_back(*trigger_ms);
+      }
+    }
+    PhaseTimes times = phase_times(times_ms);
+    return times.times_ms.size() == phases ? std::optional(std::move(times)) : std::nullopt;
+  }
+
+  /// Images by phase: of times that all slices have in common, else of each series' own.
   void read_slices(const ImageFolder& folder) {
     const size_t phases = phases_of_most(folder);
+    const std::optional<PhaseTimes> common = times_in_common(folder, phases);
     for (const ImageSeries& series : folder.series) {
       if (series.kind != SeriesKind::cine) continue;
+      const PhaseTimes& times = common ? *common : series.phases;
       for (const SliceImages& slice : series.slices) {
-        if (slice.images.size() != phases) {
-          guide_.findings.push_back(
-              {Severity::warning, "other-phases",
-               fmt::format("a slice of series {} has {} phases and not {}: it is left out", series.number,
-                           slice.images.size(), phases),
-               "", static_cast<double>(slice.images.size()), "", "Export all phases of it."});
-          continue;
-        }
         CineSlice one;
         one.plane = slice.plane;
-        for (const Image& image : folder.pixels(slice.images))
-          one.images.emplace_back(image.cast<double>());
-        slices_.push_back(std::move(one));
+        one.images.resize(phases);
+        const std::vector<Image> pixels = folder.pixels(slice.images);
+        size_t placed = 0;
+        for (size_t i = 0; i < pixels.size() && times.times_ms.size() == phases; ++i) {
+          const auto& trigger_ms = folder.images[slice.images[i]].header.trigger_ms;
+          const std::optional<size_t> phase = trigger_ms ? times.index_of(*trigger_ms) : std::nullopt;
+          if (!phase || one.has(*phase)) continue;
+          one.images[*phase] = pixels[i].cast<double>();
+          ++placed;
+        }
+        if (2 * placed > phases && placed == pixels.size()) {
+          slices_.push_back(std::move(one));
+          continue;
+        }
+        guide_.findings.push_back(
+            {Severity::warning, "other-phases",
+             fmt::format("a slice of series {} has {} images, of which {} are at a time of the {} phases of "
+                         "the others: it is left out",
+                         series.number, pixels.size(), placed, phases),
+             "", static_cast<double>(pixels.size()), "", "Export all phases of it."});
       }
     }
     const Levels levels = slices_.empty() ? Levels{} : levels_of(slices_);
@@ -273,7 +308,7 @@ class CineFinder {
 
   /// The middle of what is as bright as blood in the first phase.
   static Vector3d centre_of_blood(const CineSlice& slice) {
-    const Eigen::ArrayXXd& image = slice.images.front();
+    const Eigen::ArrayXXd& image = slice.first_image();
     Vector2d sum = Vector2d::Zero();
     double count = 1e-9;
     for (Eigen::Index r = 0; r < image.rows(); ++r)
@@ -294,7 +329,7 @@ class CineFinder {
       if (slice.is_long) {
         const Vector2d up = (on_image(slice.plane, axis_.point + axis_.direction) - centre).normalized();
         const auto closed = [&](const Vector2d& d) {
-          return wall_on_ray(slice, profile_of(slice, slice.images[0], centre, d)).has_value();
+          return wall_on_ray(slice, profile_of(slice, slice.first_image(), centre, d)).has_value();
         };
         votes += (closed(-up) ? 1 : 0) - (closed(up) ? 1 : 0);
       }
@@ -304,7 +339,7 @@ class CineFinder {
     for (const CineSlice& slice : slices_) {
       if (slice.is_long) continue;
       const double height = axis_.direction.dot(slice.plane.origin_mm - axis_.point);
-      slope += height * static_cast<double>((slice.images[0] > slice.levels.inner()).count());
+      slope += height * static_cast<double>((slice.first_image() > slice.levels.inner()).count());
     }
     return slope > 0;
   }
@@ -350,7 +385,7 @@ class CineFinder {
       // A slice that the base cuts, or nearly, shows two things at once.
       const double top_mm =
           axis_.direction.dot(crossing_of(slice) - axis_.point) + 0.5 * slice.plane.thickness_mm;
-      if (slice.is_long || top_mm > base_mm) continue;
+      if (slice.is_long || !slice.has(phase) || top_mm > base_mm) continue;
       Vector2d centre = on_image(slice.plane, crossing_of(slice));
       // The slice may be displaced: its centre is that of its contour.
       for (int i = 0; i < 3; ++i) {

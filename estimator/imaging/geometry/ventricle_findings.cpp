@@ -33,6 +33,21 @@ void add_no_plane(std::vector<Finding>& findings, const GuidePoints& guide,
        "scatter across it."});
 }
 
+void add_no_points(std::vector<Finding>& findings, const GuidePoints& guide,
+                   const std::vector<GuideSlice>& slices) {
+  std::vector<std::string> names;
+  for (size_t s = 0; s < slices.size(); ++s)
+    if (slices[s].points == 0) names.push_back(guide.slices[s]);
+  if (names.empty()) return;
+  findings.push_back(
+      {Severity::warning, "no-points",
+       fmt::format("{} of {} slices have no points of a wall: where they lie is not measured", names.size(),
+                   slices.size()),
+       fmt::format("slice {}", fmt::join(names, ", ")), static_cast<double>(names.size()), "",
+       "Beyond the apex and the base there is none. If a wall is seen there, give points of it "
+       "in a table (docs/lv.md)."});
+}
+
 /// From the outer apex to the base.
 double length_mm(const VentricleFit& fit) {
   const VentricleWalls& walls = fit.phases.front();
@@ -46,6 +61,7 @@ std::vector<Finding> ventricle_findings(const VentricleFit& fit, const GuidePoin
                                         const VentricleOptions& options) {
   std::vector<Finding> findings;
   add_no_plane(findings, guide, slices, options);
+  add_no_points(findings, guide, slices);
   if (fit.noise_factor > much_noise)
     findings.push_back(
         {Severity::warning, "noise",

@@ -430,7 +430,9 @@ VentricleFit fit_ventricle(const GuidePoints& given, const VentricleOptions& opt
   fit.shift_spread_mm = walls.shift_spread_mm();
   for (size_t s = 0; s < slices.size(); ++s) {
     SliceShift shift{guide.slices[s], held[s]};
-    if (!held[s]) {
+    if (options.estimate_shifts && slices[s].points == 0) {
+      shift = {.slice = guide.slices[s], .sigma_mm = walls.shift_spread_mm()};  // nothing is seen of it
+    } else if (!held[s]) {
       shift.shift_mm = walls.shift_mm(place[s]);
       shift.sigma_mm = walls.shift_sigma_mm(place[s]);
     }

@@ -44,7 +44,8 @@ struct SliceShift {
   std::string slice;
   bool is_reference = false;
   Eigen::Vector3d shift_mm = Eigen::Vector3d::Zero();  ///< the slice was seen displaced by this; patient axes
-  double sigma_mm = 0;                                 ///< of each of its two components in the plane
+  double sigma_mm =
+      0;  ///< of each of its two components in the plane; of a slice without points the others' spread
 };
 
 struct VentricleFit {

@@ -405,7 +405,9 @@ class Sorter {
       complain(Severity::warning, "phase-missing",
                fmt::format("phase {} of {} is missing in this slice", missing, found.size()), slice.images[0],
                static_cast<double>(std::count(found.begin(), found.end(), 0)), "phases",
-               "Tracking goes across the gap. Export the series again if the scanner still has it.");
+               "What is measured goes across the gap, or without it. Export the series again if the scanner "
+               "still has "
+               "it.");
   }
 
   bool same_pixels(size_t a, size_t b) { return (pixels(a) == pixels(b)).all(); }

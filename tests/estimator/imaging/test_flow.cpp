@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "estimator/imaging/flow/flow_session.hpp"
+#include "tests/estimator/imaging/finding_ids.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 #include "tools/sim_scanner/phase_contrast_scan.hpp"
 
@@ -253,6 +254,51 @@ TEST(Flow, WrapsBeyondRecoveryAreRefused) {
   protocol.venc_cm_s = 60;
   EXPECT_THAT(refusal(fast, protocol),
               AllOf(HasSubstr("wraps beyond recovery"), HasSubstr("venc above the peak")));
+}
+
+TEST(Flow, WhatContradictsTheHeadersIsTakenAndTold) {
+  const FlowMeasurement slip = measured(phantom(), small(), {.venc_cm_s = 50.0, .interval_s = 3.0});
+  EXPECT_EQ(slip.scan.venc_cm_s, 50);
+  EXPECT_THAT(test::ids_of(slip.findings),
+              testing::IsSupersetOf({"venc-contradicted", "period-contradicted", "cycle-not-seen"}));
+  const FlowMeasurement same = measured(phantom(), small(), {.venc_cm_s = 100.0, .interval_s = 1.2});
+  EXPECT_THAT(same.findings, testing::IsEmpty());
+}
+
+TEST(PressureVolumeLoop, FlowOutOfTheSpecimenIsNotTakenForFlowIntoIt) {
+  const ScratchFolder scratch;
+  std::filesystem::create_directory(scratch.path() / "dicom");
+  scanner::scan_flow(phantom(), small(), scratch.path() / "dicom");
+  std::string pressure = "time_s,cavity_kPa\n";
+  runfile::PumpTrace pump;
+  for (int i = 0; i < 1500; ++i) {
+    const double t = i / 300.0;
+    pressure += fmt::format("{:.5f},{:.6f}\n", t, 0.1 * phantom().volume_mL(t));
+    pump.time_s.push_back(t);
+    pump.commanded_mL.push_back(1.3 * phantom().volume_mL(t));
+  }
+  FlowSessionRequest request;
+  request.folder = scratch.path() / "dicom";
+  request.pressure = scratch.write("p.csv", pressure);
+  request.trigger = scratch.write("t.csv", "time_s\n0\n1.2\n2.4\n3.6\n");
+  EXPECT_THAT(measure_session(request).findings, testing::IsEmpty());
+  request.scan.reverse = true;
+  const FlowSession reversed = measure_session(request);
+  EXPECT_THAT(test::ids_of(reversed.findings), testing::ElementsAre("pressure-falls"));
+  // With the pump's record it is no doubt.
+  runfile::RecordedRun run = run_of_tables(*request.pressure, *request.trigger);
+  run.pump = pump;
+  const auto loop_with = [&](const FlowMeasurement& flow) {
+    return pressure_volume_loop(flow, {run, runfile::rows_of(run)}, {});
+  };
+  EXPECT_THAT(test::message_of([&] { (void)loop_with(reversed.flow); }),
+              AllOf(HasSubstr("falls while the pump fills"), HasSubstr("--reverse")));
+  request.scan.reverse = false;
+  const FlowMeasurement right = measure_session(request).flow;
+  EXPECT_THAT(loop_with(right).findings, testing::IsEmpty());
+  for (double& volume_mL : run.pump.commanded_mL)
+    volume_mL *= 0.5;
+  EXPECT_THAT(test::ids_of(loop_with(right).findings), testing::ElementsAre("more-than-pumped"));
 }
 
 TEST(PressureVolumeLoop, ItsAreaIsTheWork) {

@@ -245,6 +245,20 @@ TEST(Ventricle, SlicesThatMakeNoPlaneAreNamed) {
   EXPECT_THAT(ids_of(measured(guide, kept).fit), testing::Not(testing::Contains("no-plane")));
 }
 
+TEST(Ventricle, ASliceWithoutPointsIsNamedAndItsPlaceIsNotKnown) {
+  GuidePoints guide =
+      guide_points_from_text(click(VentriclePhantom(), {.shift_mm = 3}).guide_csv, "heart.guide.csv");
+  guide.slices.emplace_back("sa99");
+  const VentricleSession session = measure_ventricle({}, std::move(guide));
+  const SliceShift& unseen = session.fit.shifts.back();
+  EXPECT_EQ(unseen.slice, "sa99");
+  EXPECT_FALSE(unseen.is_reference);
+  EXPECT_EQ(unseen.sigma_mm, session.fit.shift_spread_mm);
+  EXPECT_GT(unseen.sigma_mm, 1.0);
+  EXPECT_THAT(session.fit.findings, testing::Contains(AllOf(testing::Field(&Finding::id, "no-points"),
+                                                            testing::Field(&Finding::where, "slice sa99"))));
+}
+
 TEST(Ventricle, AHeartSmallerThanARatsIsAskedForItsUnit) {
   for (const double unit_mm : {10.0, 1000.0}) {
     const VentricleFit fit =

@@ -7,6 +7,7 @@
 
 #include "estimator/imaging/diffusion/tensor_fit.hpp"
 #include "estimator/imaging/geometry/cine_points.hpp"
+#include "estimator/imaging/series/image_folder.hpp"
 #include "estimator/mesh/ellipsoid.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 #include "tools/sim_scanner/diffusion_scan.hpp"
@@ -26,10 +27,10 @@ class VentricleScan : public testing::Test {
     protocol_.tagged = false;
     protocol_.cine = protocol_.dark_bath = true;
   }
-  void scan_phases(int phases) const {
+  void scan_phases(int phases, double step_s = 0.1) const {
     MovingBody body{&mesh_, {}, {}, 1.0};
     for (int k = 0; k < phases; ++k) {
-      body.times_s.push_back(0.01 + 0.1 * k);
+      body.times_s.push_back(0.01 + step_s * k);
       // It widens by 3 % from phase to phase: without motion an export is none.
       NodeField position_mm = mesh_.reference();
       for (size_t node = 0; node < mesh_.node_count(); ++node)
@@ -55,7 +56,7 @@ TEST_F(VentricleScan, WallsAndBaseAreFoundInItsCines) {
   protocol_.short_axis_mm = {30};
   protocol_.long_axis_deg = {};
   protocol_.seed = 0;
-  scan_phases(3);
+  scan_phases(3, 0.13);
   const imaging::GuidePoints guide = imaging::cine_guide_points(scratch_.path());
   ASSERT_EQ(guide.phases.size(), 4U);
   int walls = 0, base = 0;
@@ -75,6 +76,42 @@ TEST_F(VentricleScan, WallsAndBaseAreFoundInItsCines) {
   }
   EXPECT_GT(base, 40);
   EXPECT_GT(walls, 300);
+}
+
+/// Mean distance of the inner wall's points from the axis, by phase.
+std::vector<double> inner_radius_mm(const imaging::GuidePoints& guide) {
+  std::vector<double> sum(guide.phases.size()), count(guide.phases.size());
+  for (const imaging::GuidePoint& point : guide.points) {
+    if (point.surface != imaging::GuideSurface::endo || guide.slices[point.slice] != "sa01") continue;
+    sum[point.phase] += point.place_mm.head<2>().norm();
+    count[point.phase] += 1;
+  }
+  for (size_t p = 0; p < sum.size(); ++p)
+    sum[p] /= count[p];  // NaN where the slice has none
+  return sum;
+}
+
+TEST_F(VentricleScan, AMissingImageMovesNoOtherToItsPhase) {
+  scan_phases(6);
+  const std::vector<double> whole = inner_radius_mm(imaging::cine_guide_points(scratch_.path()));
+  // Of one half of the slices the third image is lost, of the other the fifth: all have five.
+  const imaging::ImageFolder folder = imaging::read_image_folder(scratch_.path());
+  size_t count = 0;
+  for (const imaging::ImageSeries& series : folder.series)
+    for (const imaging::SliceImages& slice : series.slices)
+      std::filesystem::remove(folder.files[folder.images[slice.images[count++ % 2 == 0 ? 2 : 4]].file]);
+  ASSERT_EQ(count, 7U);
+  const imaging::GuidePoints guide = imaging::cine_guide_points(scratch_.path());
+  ASSERT_EQ(guide.phases.size(), 6U);
+  const std::vector<double> found = inner_radius_mm(guide);
+  int compared = 0;
+  for (size_t p = 0; p < found.size(); ++p) {
+    if (std::isnan(found[p])) continue;
+    EXPECT_NEAR(found[p], whole[p], 0.1) << p;  // the next phase's is half a millimetre larger
+    ++compared;
+  }
+  EXPECT_EQ(compared,
+            4);  // its own lost one, and its neighbour's, without which the wall's slope is not known
 }
 
 TEST_F(VentricleScan, TissueDiffusesAlongItsFibres) {
