@@ -87,7 +87,7 @@ void judge(StudyReconstruction& result, const Study& study, const Measurement& m
   result.families = family_fits(result.fields, result.groups, measurement.tags.size());
   result.slices = slice_offsets(result.fields, result.groups, measurement.tags);
   for (const FrameField& field : result.fields)
-    result.volumes.push_back(check_volume(forms, field));
+    result.volumes.push_back(check_volume(forms, field, most_loaded(result.fields)));
   if (!options.quick) result.coverage = coverage_of(forms, most_loaded(result.fields));
   const std::vector<Finding> found = motion_findings(result);
   result.findings.insert(result.findings.end(), found.begin(), found.end());

@@ -2,12 +2,47 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "estimator/fe/gauss_points.hpp"
 
 namespace diastole {
 
-VolumeCheck check_volume(const FieldForms& forms, const FrameField& field) {
+namespace {
+
+double volume_mm3(const HermiteMesh& mesh, const NodeField& position_mm) {
+  const GaussTables& tables = gauss_tables();
+  double sum = 0.0;
+  for (size_t e = 0; e < mesh.element_count(); ++e)
+    for (size_t q = 0; q < gauss_points; ++q)
+      sum += tables.weight[q] * mesh.xi_gradient(position_mm, {e, tables.xi[q]}).determinant();
+  return std::abs(sum);
+}
+
+/// What smoothing makes of the volume of a motion, by smoothing it as if it were the frame's data (twicing: J. W. Tukey, Exploratory
+/// Data Analysis (1977) 526).
+double smoothing_error_mm3(const FieldForms& forms, const SmoothedSystem& system,
+                           const Eigen::VectorXd& motion) {
+  const HermiteMesh& mesh = forms.space.mesh();
+  const auto volume_after = [&](const Eigen::VectorXd& q) {
+    NodeField position_mm = mesh.reference();
+    std::ranges::transform(position_mm, forms.space.field_of(q), position_mm.begin(), std::plus<>());
+    return volume_mm3(mesh, position_mm);
+  };
+  const Eigen::VectorXd seen = system.weighted_rows() * motion;
+  return volume_after(system.solve(system.weighted_rows().transpose() * seen).col(0)) - volume_after(motion);
+}
+
+/// The largest motion, made as large as this frame's as its points see it.
+Eigen::VectorXd scaled_to(const SmoothedSystem& system, const Eigen::VectorXd& largest) {
+  const Eigen::VectorXd own = system.weighted_rows() * system.solution();
+  const Eigen::VectorXd seen = system.weighted_rows() * largest;
+  return own.dot(seen) / std::max(seen.squaredNorm(), 1e-300) * largest;
+}
+
+}  // namespace
+
+VolumeCheck check_volume(const FieldForms& forms, const FrameField& field, const FrameField& largest) {
   const HermiteMesh& mesh = forms.space.mesh();
   const GaussTables& tables = gauss_tables();
   VolumeCheck check;
@@ -38,7 +73,11 @@ VolumeCheck check_volume(const FieldForms& forms, const FrameField& field) {
   check.mean_ratio = moved_mm3 / volume_mm3;
   check.rms = std::sqrt(check.rms / volume_mm3);
   of_body /= volume_mm3;
-  check.se = std::sqrt(of_body.dot(field.system->solve(of_body).col(0)));
+  const SmoothedSystem& system = *field.system;
+  for (const Eigen::VectorXd& motion : {system.solution(), scaled_to(system, largest.system->solution())})
+    check.smoothing_error =
+        std::max(check.smoothing_error, std::abs(smoothing_error_mm3(forms, system, motion)) / volume_mm3);
+  check.se = std::hypot(std::sqrt(of_body.dot(field.system->solve(of_body).col(0))), check.smoothing_error);
   const std::vector<double> variances = field.system->variances(of_elements);
   for (size_t e = 0; e < variances.size(); ++e)
     check.elements[e].se = std::sqrt(variances[e]);

@@ -14,13 +14,16 @@ struct ElementVolume {
 
 struct VolumeCheck {
   double mean_ratio = 1.0;  ///< of the whole body
-  double se = 0.0;
+  double se = 0.0;          ///< with smoothing_error
+  double smoothing_error =
+      0.0;               ///< what smoothing makes of the volumes of this field and of the largest motion
   double rms = 0.0;      ///< of J - 1 over the body
   double p95 = 0.0;      ///< of |J - 1|
   double largest = 0.0;  ///< of |J - 1|, at Gauss points
   std::vector<ElementVolume> elements;
 };
 
-VolumeCheck check_volume(const FieldForms& forms, const FrameField& field);
+/// `largest`: the frame of the largest motion, in which smoothing hides the least.
+VolumeCheck check_volume(const FieldForms& forms, const FrameField& field, const FrameField& largest);
 
 }  // namespace diastole

@@ -73,6 +73,47 @@ TEST_F(Findings, SoundDataAreMetWithSilence) {
   }
 }
 
+/// Whatever the noise and the number of points, an incompressible motion's volume is constant within its errors, smoothing's own among them.
+TEST_F(Findings, TheVolumesErrorCoversItWhateverTheNoise) {
+  int frames = 0, beyond_two = 0;
+  for (const double sigma_mm : {0.2, 0.5, 1.0})
+    for (const size_t tags : {size_t{300}, size_t{900}})
+      for (const unsigned seed : {1U, 2U}) {
+        const StudyReconstruction found = reconstruct_study(
+            small_study(), sound({.tags_a_frame = tags, .sigma_mm = sigma_mm, .seed = seed}), {});
+        for (const VolumeCheck& volume : found.volumes) {
+          const double sigmas = (volume.mean_ratio - 1.0) / volume.se;
+          EXPECT_LT(std::abs(sigmas), 3.5) << sigma_mm << " mm, " << tags << " points, seed " << seed;
+          beyond_two += std::abs(sigmas) > 2.0 ? 1 : 0;
+          ++frames;
+        }
+      }
+  EXPECT_EQ(frames, 48);
+  EXPECT_LE(beyond_two, 9);  // one in twenty would be two; frames of one seed are not independent
+}
+
+TEST_F(Findings, ABodyThatSwells) {
+  Measurement swollen = sound();
+  swollen.tags.clear();
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  std::normal_distribution<double> noise(0.0, 0.3);
+  for (int i = 0; i < 1600; ++i) {
+    const int frame = 1 + i % 4;
+    const double r = 23 + 26 * unit(random), angle = 6.2 * unit(random), z = 82 * (unit(random) - 0.5);
+    const std::array<double, 3> X{r * std::cos(angle), r * std::sin(angle), z};
+    const double by = 1.0 + 0.03 * frame / 4.0;  // in each direction
+    swollen.points.push_back(
+        {frame, X, {by * X[0] + noise(random), by * X[1] + noise(random), by * X[2] + noise(random)}, 0.3});
+  }
+  const std::vector<Finding> told = in_motion(swollen);
+  const auto grown = std::ranges::find_if(told, [](const Finding& finding) {
+    return finding.id == "volume" && finding.where.find("frame 4") != std::string::npos;
+  });
+  ASSERT_NE(grown, told.end()) << words(told);
+  EXPECT_NEAR(grown->number, 9.3, 1.0);
+}
+
 TEST_F(Findings, CoordinatesInAnotherUnit) {
   for (const auto& [in_mm, unit] :
        {std::pair{10.0, "centimetres"}, {25.4, "inches"}, {0.001, "micrometres"}}) {
