@@ -96,7 +96,7 @@ ExitCode check_file(const std::string& file, size_t threads, const CommandOutput
   } else {
     fmt::print("\n  Checks\n");
     for (const explain::EffectCheck& check : checks)
-      fmt::print("    {:<22}{:<8}{}\n", check.name, check.passed ? "passed" : "FAILED", check.detail);
+      fmt::print("    {:<22}{:<8}{}\n", check.name, check.outcome(), check.detail);
   }
   return std::ranges::all_of(checks, &explain::EffectCheck::passed) ? ExitCode::done : ExitCode::negative;
 }

@@ -189,6 +189,7 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
   } else {
     remark_on_imaged_load(study, "fit");
   }
+  remark_on_model(study);
   const Measurement measurement = read_measurement(study);
   StudyFitOptions options;
   if (loop) options.work = measured_work(*loop, measurement, *arguments.energy);

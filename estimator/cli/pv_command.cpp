@@ -136,6 +136,7 @@ ExitCode run_pv(const PvArguments& arguments, const CommandOutput& out) {
                             "Name the page or the table to write, for example curve.html.");
   const Study study = read_study(arguments.study);
   remark_on_imaged_load(study, "pv");
+  remark_on_model(study);
   ElasticModel model = make_affected_model(study, with_progress("pv"));
   require_closed_cavity(study, model);
   remark_on_size(model.mesh(), "pv");

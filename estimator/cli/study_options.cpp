@@ -4,6 +4,9 @@
 
 #include <cstdio>
 
+#include "estimator/cli/output_files.hpp"
+#include "estimator/model/affected_model.hpp"
+
 namespace diastole {
 
 void add_study(CLI::App& command, StudyOptions& options) {
@@ -34,6 +37,8 @@ void remark_on_imaged_load(const Study& study, std::string_view command) {
              "of solve, fit, montecarlo, design and mesh export finds the one that is.\n",
              command, study.imaged_at->pressure_kPa);
 }
+
+void remark_on_model(const Study& study) { print_findings(model_findings(study), stderr); }
 
 Study read_study(const StudyOptions& options) {
   Study study = read_study(options.study);

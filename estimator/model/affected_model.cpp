@@ -62,6 +62,25 @@ bool shows_in_images(const Study& study) {
   });
 }
 
+std::vector<Finding> model_findings(const Study& study) {
+  std::vector<Finding> findings = fibre_findings(study);
+  const EffectLibrary library = effects_known_to(study);
+  for (const std::string& id : study.effects) {
+    const Effect& effect = effect_named(library, study, id);
+    if (effect.text().port != Port::specimen) continue;
+    if (!effect.field_parameters().empty() && !(is_gel(study) && is_of_the_rig(effect))) continue;
+    findings.push_back(
+        {Severity::warning, "effect-of-recordings",
+         fmt::format("{} changes the specimen's pressure in recordings (explain, simulate), and "
+                     "nothing of its deformation here",
+                     id),
+         study.file.string(), 1.0, "",
+         "What is computed is the specimen without it; leave it out of [model] effects to be "
+         "rid of this remark."});
+  }
+  return findings;
+}
+
 FieldModel field_model_of(const Study& study) {
   const auto& annulus = std::get<AnnulusSpecimen>(study.specimen);
   FieldModel model;

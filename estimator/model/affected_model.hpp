@@ -4,6 +4,7 @@
 
 #include "estimator/effects/field_model.hpp"
 #include "estimator/fe/elastic_model.hpp"
+#include "estimator/io/finding.hpp"
 #include "estimator/io/study.hpp"
 
 namespace diastole {
@@ -27,6 +28,10 @@ ElasticModel make_affected_model(const Study& study, SolveOptions options = {});
 
 /// Whether one of the study's effects does.
 bool shows_in_images(const Study& study);
+
+/// What of the study its specimen's mechanics does not take as it may be meant: effects that are one of its pressures alone, fibres
+/// that are another's.
+std::vector<Finding> model_findings(const Study& study);
 
 /// What the study's effects change; the base model where none of them shows in images.
 FieldModel field_change_of(const Study& study);

@@ -97,19 +97,24 @@ MeshBody refined(MeshBody body, const std::array<int, 3>& halvings) {
 }
 
 /// Measured fibres in place of assumed ones. Without [images.to_specimen] the points are in the specimen's own axes.
-FibreField measured_fibres(const Study& study, const HermiteMesh& mesh) {
+std::vector<FibrePoint> measured_directions(const Study& study) {
   const Placement to_images = placement_of(study);
   std::vector<FibrePoint> points;
   for (const FibrePointRow& row : read_fibre_points(*study.fibres)) {
     const Eigen::Vector3d place(row.place_mm.data()), direction(row.direction.data());
     points.push_back({to_images.back(place), to_images.rotation.transpose() * direction, row.sigma_deg});
   }
+  return points;
+}
+
+FibresThroughPoints measured_fibres(const Study& study, const HermiteMesh& mesh,
+                                    const std::vector<FibrePoint>& points) {
   try {
-    FibresThroughPoints through = fibres_through_points(mesh, points);
-    return std::move(through.fibres);
+    return fibres_through_points(mesh, points);
   } catch (const std::invalid_argument& error) {
     refuse(study, "specimen.fibres", fmt::format("{}: {}", study.fibres->string(), error.what()),
-           "The file has patient coordinates: [images.to_specimen] says where the specimen lies in them.");
+           "They are of another specimen or place. The file has patient coordinates: [images.to_specimen] "
+           "says where the specimen lies in them.");
   }
 }
 
@@ -199,17 +204,51 @@ void require_chamber_wall(const Study& study, const ElasticModel& model) {
                   "leave out chamber.compliance_mL_per_kPa for constant pressure around the specimen.");
 }
 
-}  // namespace
-
-MeshBody study_body(const Study& study) {
+MeshBody refined_body(const Study& study) {
   MeshBody body = std::visit([](const auto& specimen) { return make_body(specimen); }, study.specimen);
   try {
     body = refined(std::move(body), study.refine);
   } catch (const std::invalid_argument& error) {
     refuse(study, "model.refine", error.what(), "Leave the mesh as the file has it.");
   }
-  if (study.fibres) body.fibres = measured_fibres(study, body.mesh);
   return body;
+}
+
+}  // namespace
+
+MeshBody study_body(const Study& study) {
+  MeshBody body = refined_body(study);
+  if (study.fibres) body.fibres = measured_fibres(study, body.mesh, measured_directions(study)).fibres;
+  return body;
+}
+
+std::vector<Finding> fibre_findings(const Study& study) {
+  if (!study.fibres) return {};
+  const std::vector<FibrePoint> points = measured_directions(study);
+  const FibresThroughPoints found = measured_fibres(study, refined_body(study).mesh, points);
+  std::vector<Finding> findings;
+  const auto add = [&](const char* id, std::string what, double number, const char* unit) {
+    findings.push_back({Severity::warning, id, std::move(what), study.fibres->string(), number, unit,
+                        "Check that the fibres are this specimen's, and where it lies in them "
+                        "([images.to_specimen])."});
+  };
+  constexpr double most_beside = 0.1;
+  const auto beside = static_cast<double>(points.size() - found.used);
+  if (beside > most_beside * static_cast<double>(points.size()))
+    add("fibres-beside", fmt::format("{} of {} fibre directions lie beside the mesh", beside, points.size()),
+        beside, "points");
+  double squares = 0;
+  for (const FibrePoint& point : points)
+    squares += point.sigma_deg * point.sigma_deg / static_cast<double>(points.size());
+  constexpr double most_sigmas = 3.0;
+  if (found.rms_deg > most_sigmas * std::sqrt(squares))
+    add("fibres-misfit",
+        fmt::format(
+            "fibre directions differ by {:.1f} degrees RMS from the smoothest field through them, and "
+            "their errors are {:.1f}",
+            found.rms_deg, std::sqrt(squares)),
+        found.rms_deg, "degrees");
+  return findings;
 }
 
 Placement placement_of(const Study& study) {

@@ -2,6 +2,7 @@
 // The forward model that a study describes: its mesh, law, start values and supports.
 
 #include "estimator/fe/elastic_model.hpp"
+#include "estimator/io/finding.hpp"
 #include "estimator/io/study.hpp"
 #include "estimator/mesh/mesh_file.hpp"
 #include "estimator/mesh/placed_mesh.hpp"
@@ -11,6 +12,9 @@ namespace diastole {
 /// The specimen's mesh, refined as the study says, and its fibres: those that the study has measured, if any. Throws InputError if a mesh
 /// file is wrong or cannot be refined, or if measured fibres are not in the mesh.
 MeshBody study_body(const Study& study);
+
+/// What is doubtful about the study's measured fibres: they lie beside the mesh, or are not what a field in it can be.
+std::vector<Finding> fibre_findings(const Study& study);
 
 /// From the specimen's axes to the images': [images.to_specimen]; nothing moves without it.
 Placement placement_of(const Study& study);

@@ -138,6 +138,7 @@ def of_files(place):
     yield "mesh", place.run("mesh export examples/lv-clean.study.toml -o lv.mesh.toml")
     yield "effects", place.run("effects")
     yield "effects", place.run("effects hose-compliance")
+    yield "effects", place.run("effects examples/effects/chamber-back-pressure.effect.toml")
     yield "reconstruct", place.run("reconstruct examples/phantom-a.study.toml --mesh 4,2,1 -o gel.points.csv")
     yield "images", place.run("images examples/tagged-gel/dicom")
     yield "track", place.run("track examples/tagged-gel/dicom -o gel.tags.csv")

@@ -95,8 +95,9 @@ EffectCheck EffectTrial::neutral() const {
     const rig::Prediction same = shown(values);
     if (same.cavity_kPa == base.cavity_kPa && same.pump_kPa == base.pump_kPa) continue;
     check.passed = false;
-    check.detail =
-        fmt::format("{}: pressures differ by {:.3g} kPa", what, largest_difference_kPa(same, base));
+    check.detail = is_finite(same) ? fmt::format("{}: pressures differ by {:.3g} kPa", what,
+                                                 largest_difference_kPa(same, base))
+                                   : fmt::format("{}: no finite pressures", what);
   }
   return check;
 }
@@ -104,9 +105,9 @@ EffectCheck EffectTrial::neutral() const {
 EffectCheck EffectTrial::shows() const {
   constexpr double least_kPa = 0.005;
   const rig::Prediction typical = shown(typical_);
+  if (!is_finite(typical)) return {"visible", false, "no finite pressures where it is typical"};
   const double largest = largest_difference_kPa(typical, shown({}));
-  return {"visible", is_finite(typical) && largest > least_kPa,
-          fmt::format("{:.3g} kPa where it is typical", largest)};
+  return {"visible", largest > least_kPa, fmt::format("{:.3g} kPa where it is typical", largest)};
 }
 
 EffectCheck EffectTrial::bounded() const {
@@ -216,7 +217,8 @@ EffectCheck EffectTrial::found_again() const {
                       "search from there {:+.1f}; {}{}",
                       effect_.parameters()[0].name, options.values[0], found.model.values[0], found.errors[0],
                       100.0 * differs, found.log_posterior - at_truth.log_posterior,
-                      inference::sentence(found.termination), remark)};
+                      inference::sentence(found.termination), remark),
+          !is_near && !does_the_same};
 }
 
 EffectCheck EffectTrial::silent() const {

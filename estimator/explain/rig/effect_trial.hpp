@@ -17,7 +17,9 @@ namespace diastole::explain {
 struct EffectCheck {
   std::string name;  ///< "neutral value"
   bool passed = false;
-  std::string detail;  ///< what was seen, with figures
+  std::string detail;    ///< what was seen, with figures
+  bool is_open = false;  ///< passed, since these data decide nothing
+  [[nodiscard]] std::string_view outcome() const { return !passed ? "FAILED" : is_open ? "open" : "passed"; }
 };
 
 class EffectTrial {

@@ -59,6 +59,11 @@ TEST(FibresThroughPoints, RefusesPointsElsewhere) {
   const HermiteMesh mesh = make_ellipsoid(shape);
   const std::vector<FibrePoint> points(20, {{500, 0, 0}, {1, 0, 0}, 1.0});
   EXPECT_THROW((void)fibres_through_points(mesh, points), std::invalid_argument);
+  // Another's points, of which some happen to lie within it.
+  std::vector<FibrePoint> moved = points_of(mesh, ellipsoid_fibres(shape, 60, -60));
+  for (FibrePoint& point : moved)
+    point.place_mm.x() += 25;
+  EXPECT_THROW((void)fibres_through_points(mesh, moved), std::invalid_argument);
 }
 
 TEST(FibreField, TransverseFibresLeaveTheWall) {

@@ -166,6 +166,16 @@ std::string shaping_words(const Shaping& shaping) {
   }
   if (lesson.iterations.empty())
     text += fmt::format("by the model alone: NRMSE {:.2f} %\n", 100.0 * shaping.nrmse);
+  if (lesson.best) {
+    const Iteration& best = lesson.iterations[*lesson.best];
+    constexpr double much = 0.01;  // of the range: what the shape is held to
+    const double part = std::abs(best.level_error_mL) / best.cavity_mL.range();
+    if (part > much)
+      text += fmt::format(
+          "its shape is right to that, its mean volume is {:+.2f} mL off, {:.0f} % of the range: "
+          "what leaks from cycle to cycle no drive that repeats itself brings back\n",
+          best.level_error_mL, 100.0 * part);
+  }
   if (lesson.ending != Ending::none) text += fmt::format("{}: {}\n", in_words(lesson.ending), lesson.reason);
   text += fmt::format(
       "drive: stroke {:.3f} mL, offset {:.3f} mL, period {:g} s, trigger {:.1f} ms after the first step\n",
