@@ -66,7 +66,7 @@ void print_wait_states(const std::string& image) {
                             {"caches as in the manual", FlashTiming::cached},
                             {"no cache, no prefetch", FlashTiming::misses}};
   fmt::print("\n{:<52}{:>9}{:>15}{:>10}\n", "5 wait states", "steps/s", "cycles a step", "asleep");
-  for (const Waveform waveform : {Waveform::trapezoidal, Waveform::sinusoidal}) {
+  for (const Waveform waveform : {Waveform::trapezoidal, Waveform::sinusoidal, Waveform::uploaded}) {
     for (const double rate_Hz : {100e3, 200e3}) {
       for (const bool flood : {false, true}) {
         for (const Case& each : cases) {
@@ -75,7 +75,7 @@ void print_wait_states(const std::string& image) {
                               .period_s = 1.0,
                               .flood = flood,
                               .timing = each.timing};
-          if (waveform == Waveform::sinusoidal) trial.from = 0.2, trial.to = 0.3;
+          if (waveform != Waveform::trapezoidal) trial.from = 0.2, trial.to = 0.3;
           const StepRateFigures figures = measure(image, trial);
           const bool held = figures.problem.empty();
           fmt::print("{:<52}{:>9.0f}{:>15}{:>10}  {}\n",

@@ -1,7 +1,5 @@
 #include "firmware/core/uploaded/crossings.hpp"
 
-#include <bit>
-
 namespace diastole::firmware {
 
 namespace {
@@ -9,63 +7,73 @@ namespace {
 constexpr int kPlaces = 42;
 constexpr std::int64_t kWhole = std::int64_t{1} << kPlaces;
 
-/// value · u for u in units of 2^-42, below 1; rounded towards 0.
-std::int64_t times(std::int64_t value, std::int64_t u) {
-  const Q64 fraction = static_cast<Q64>(u) << (64 - kPlaces);
+/// value · fraction, rounded towards 0.
+std::int64_t times(std::int64_t value, Q64 fraction) {
   return value < 0 ? -static_cast<std::int64_t>(multiply_high(static_cast<std::uint64_t>(-value), fraction))
                    : static_cast<std::int64_t>(multiply_high(static_cast<std::uint64_t>(value), fraction));
 }
 
-/// The leading bits of a positive number, below 2^30, and how many places were dropped.
-struct Leading {
-  std::int32_t bits;
-  int dropped;
+/// The curve's slope in the interval, in single precision: for steps, whose end is looked at exactly. Every operation is rounded by
+/// itself (CMakeLists.txt), so that it is the same everywhere.
+class Slope {
+ public:
+  Slope(const KnotCubic& curve, std::int64_t u)
+      : square_(static_cast<float>(curve.square)),
+        thrice_cube_u_(3.0F * static_cast<float>(curve.cube) * part(u)),
+        slope_(static_cast<float>(curve.linear) + (2.0F * square_ + thrice_cube_u_) * part(u)) {}
+
+  /// Newton's step for an excess of this size, in units of 2^-42 of the interval; the whole interval if it is beyond.
+  [[nodiscard]] std::int64_t step(std::int64_t size) const {
+    // Small ones, which nearly all are, are converted by the hardware.
+    const float excess = size < std::int64_t{1} << 31 ? static_cast<float>(static_cast<std::int32_t>(size))
+                                                      : static_cast<float>(size);
+    const float exact = slope_ > 0 ? excess / slope_ : 0x1p42F;
+    if (exact < 0x1p30F) return static_cast<std::int32_t>(exact);
+    return exact < 0x1p42F ? std::int64_t{static_cast<std::int32_t>(exact * 0x1p-12F)} << 12 : kWhole;
+  }
+  /// After a step of this size at most half a place is missing: it leaves |f''/2f'| step².
+  [[nodiscard]] bool suffices(std::int64_t step) const {
+    if (step >= std::int64_t{1} << 20) return false;
+    const auto size = static_cast<float>(static_cast<std::int32_t>(step));
+    const float half_second = square_ + thrice_cube_u_;
+    const float missing = size * 0x1p-42F * size * (half_second < 0 ? -half_second : half_second);
+    return 2.0F * missing < slope_;
+  }
+
+ private:
+  static float part(std::int64_t u) {
+    return static_cast<float>(static_cast<std::int32_t>(u >> 12)) * 0x1p-30F;
+  }
+
+  float square_, thrice_cube_u_, slope_;
 };
-Leading leading(std::int64_t value) {
-  const int dropped = 34 - std::countl_zero(static_cast<std::uint64_t>(value));
-  const std::int64_t bits = dropped >= 0 ? value >> dropped : value << -dropped;
-  return {static_cast<std::int32_t>(bits), dropped};
-}
 
-/// About 2^42 · dividend / divisor, both positive; at most 2^42.
-std::int64_t quotient(std::int64_t dividend, std::int64_t divisor) {
-  const Leading a = leading(dividend), b = leading(divisor);
-  const float ratio = static_cast<float>(a.bits) / static_cast<float>(b.bits);  // 0.5 … 2
-  const auto bits = static_cast<std::int32_t>(ratio * 0x1p24F);
-  const int shift = a.dropped - b.dropped + kPlaces - 24;
-  if (shift > kPlaces - 24) return kWhole;
-  if (shift >= 0) return std::int64_t{bits} << shift;
-  return shift > -32 ? bits >> -shift : 0;
-}
-
-/// After a Newton step of this size at most half a place is missing: it leaves |f''/2f'| step².
-bool step_suffices(std::int64_t step, std::int64_t half_second, std::int64_t slope) {
-  if (step >= std::int64_t{1} << 20) return false;
-  const auto size = static_cast<std::uint64_t>(half_second < 0 ? -half_second : half_second);
-  return multiply_high(static_cast<std::uint64_t>(step * step), size) < static_cast<std::uint64_t>(slope) >>
-         (64 - kPlaces + 1);
-}
-
-/// Where linear u + square u² + cube u³ = target, from `below` on and probably `pace` beyond it (0: nobody knows).
+/// Where linear u + square u² + cube u³ = target, from `below` on and probably at `guess` (not beyond `below`: nobody knows).
 /// Precondition: the cubic rises from 0 to beyond target.
-std::int64_t solve(const KnotCubic& curve, std::int64_t target, std::int64_t below, std::int64_t pace) {
+std::int64_t solve(const KnotCubic& curve, std::int64_t target, std::int64_t below, std::int64_t guess) {
   std::int64_t above = kWhole;
-  const std::int64_t end = std::int64_t{curve.linear} + curve.square + curve.cube;
-  std::int64_t u = pace > 0 ? below + pace : quotient(target > 0 ? target : 1, end << kPlaces);
+  std::int64_t u = guess;
+  if (u <= below) {  // as of a straight line
+    const std::int32_t end = curve.linear + curve.square + curve.cube;
+    u = Slope({.linear = end}, 0).step(target > 0 ? target : 1);
+  }
   if (u <= below || u >= above) u = below + (above - below) / 2;
   while (above - below > 1) {
+    const Q64 fraction = static_cast<Q64>(u) << (64 - kPlaces);
     const std::int64_t outer = curve.cube * u + (std::int64_t{curve.square} << kPlaces);
-    const std::int64_t inner = times(outer, u) + (std::int64_t{curve.linear} << kPlaces);
-    const std::int64_t excess = times(inner, u) - target;
+    const std::int64_t inner = times(outer, fraction) + (std::int64_t{curve.linear} << kPlaces);
+    // The cubic rises, so that what it rises by on the way is not negative.
+    const auto risen = static_cast<std::int64_t>(multiply_high(static_cast<std::uint64_t>(inner), fraction));
+    const std::int64_t excess = risen - target;
     if (excess == 0) return u;
-    const std::int64_t slope = times(outer + curve.cube * u, u) + inner;
     (excess < 0 ? below : above) = u;
-    const std::int64_t step = slope > 0 ? quotient(excess < 0 ? -excess : excess, slope) : kWhole;
+    const Slope slope(curve, u);
+    const std::int64_t step = slope.step(excess < 0 ? -excess : excess);
     if (step <= 1) return u;
     u = excess < 0 ? u + step : u - step;
     if (u <= below || u >= above)
       u = below + (above - below) / 2;
-    else if (step_suffices(step, outer + 2 * curve.cube * u, slope))
+    else if (slope.suffices(step))
       return u;
   }
   return below;
@@ -82,6 +90,7 @@ UploadedCrossings::UploadedCrossings(const UploadedWaveform& waveform, std::uint
   const auto stroke = static_cast<std::uint32_t>(waveform.full_scale);
   half_ = {static_cast<std::int32_t>(stroke / levels), stroke % levels};
   spacing_ = {static_cast<std::int32_t>(2 * stroke / levels), 2 * stroke % levels};
+  surely_ = static_cast<std::int32_t>(stroke / 4 / levels) + 2;
   restart();
 }
 
@@ -89,7 +98,7 @@ void UploadedCrossings::restart() {
   knot_ = height_ = 0;
   next_ = half_;
   rising_ = true;
-  from_ = 0;
+  last_ = pace_ = guess_ = 0;
   begin_flank();
   seek();
 }
@@ -131,6 +140,8 @@ void UploadedCrossings::begin_flank() {
 }
 
 bool UploadedCrossings::flank_reaches_next() const {
+  const std::int32_t beyond = rising_ ? flank_height_ - next_.whole : next_.whole - flank_height_;
+  if (beyond > surely_) return true;
   const std::int64_t height = std::int64_t{flank_height_ - next_.whole} * levels_ - next_.rest;
   return (rising_ ? height : -height) > waveform_->full_scale / 4;
 }
@@ -146,7 +157,7 @@ void UploadedCrossings::seek() {
     if (!flank_reaches_next()) {
       knot_ = flank_end_;
       height_ = flank_height_;
-      from_ = 0;
+      last_ = pace_ = guess_ = 0;
       begin_flank();
       continue;
     }
@@ -154,7 +165,8 @@ void UploadedCrossings::seek() {
     if (interval_reaches_next(end)) return;
     height_ = end;
     ++knot_;
-    from_ = 0;
+    last_ -= kWhole;
+    guess_ -= kWhole;
   }
 }
 
@@ -170,12 +182,13 @@ UploadedCrossings::Crossing UploadedCrossings::take() {
     curve_ =
         KnotCubic::between(waveform_->rise(knot_ - 1), waveform_->rise(knot_), waveform_->rise(knot_ + 1));
     curved_ = knot_;
-    pace_ = 0;
   }
-  const std::int64_t before = from_;
-  from_ = solve(curve_, next_above_knot(), from_, pace_);
-  pace_ = from_ - before;
-  const Q64 within = multiply_high(static_cast<Q64>(from_) << (64 - kPlaces), interval_fraction_);
+  const std::int64_t place = solve(curve_, next_above_knot(), last_ > 0 ? last_ : 0, guess_);
+  const std::int64_t pace = place - last_;
+  guess_ = place + 2 * pace - pace_;
+  pace_ = pace;
+  last_ = place;
+  const Q64 within = multiply_high(static_cast<Q64>(place) << (64 - kPlaces), interval_fraction_);
   const Crossing crossing{static_cast<std::uint32_t>(knot_) * interval_fraction_ + within, rising_};
   rising_ ? raise_next() : lower_next();
   seek();

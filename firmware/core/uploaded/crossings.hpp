@@ -59,6 +59,7 @@ class UploadedCrossings {
   Q64 interval_fraction_ = 0;  ///< 1 / intervals
   Level half_;                 ///< the lowest level
   Level spacing_;
+  std::int32_t surely_ = 0;  ///< a flank that goes on by more, twice, crosses the next level
   std::int32_t intervals_ = 0;
 
   std::int32_t knot_ = 0;       ///< the interval in which the next crossing lies begins at this point
@@ -66,9 +67,11 @@ class UploadedCrossings {
   std::int32_t flank_end_ = 0;  ///< the point up to which the curve goes the same way
   std::int32_t flank_height_ = 0;
   bool rising_ = true;
-  Level next_;                ///< the next level on this flank, twice
-  std::int64_t from_ = 0;     ///< of the interval, 2^-42: the last crossing in it
-  std::int64_t pace_ = 0;     ///< from the crossing before it to that one; 0: none yet in this interval
+  Level next_;  ///< the next level on this flank, twice
+  std::int64_t last_ =
+      0;  ///< the last crossing of this flank, 2^-42 of the interval: below 0 in one before it
+  std::int64_t pace_ = 0;     ///< from the crossing before it to that one; 0: none yet on this flank
+  std::int64_t guess_ = 0;    ///< of the next one: the pace goes on changing as it did
   std::int32_t curved_ = -1;  ///< the interval that curve_ is of
   KnotCubic curve_;
 };

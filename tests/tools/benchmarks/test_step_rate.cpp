@@ -58,6 +58,18 @@ TEST_P(EveryWaveform, IsPlannedInTimeAt200kHz) {
   EXPECT_EQ(figures.problem, "");
 }
 
+TEST_P(EveryWaveform, IsPlannedInTimeWithTheWaitStatesThatTheCachesLeave) {
+  NEEDS_IMAGE();
+  const StepRateFigures figures = measure(image, {.waveform = GetParam(),
+                                                  .period_s = 1.0,
+                                                  .flood = true,
+                                                  .timing = board_model::FlashTiming::cached,
+                                                  .from = 0.2,
+                                                  .to = 0.3});
+  EXPECT_EQ(figures.problem, "");
+  EXPECT_GT(figures.board.flash_wait_cycles, 0U);
+}
+
 std::vector<Waveform> moving_waveforms() {
   std::vector<Waveform> moving{Waveform::uploaded};
 #define DIASTOLE_PROFILE(number, name) \
