@@ -76,6 +76,7 @@ std::string problem_of(EmulatedSession& session, const StepRateTrial& trial, uin
   if (session.steps - steps_before != expected)
     return fmt::format("{} steps instead of {}", session.steps - steps_before, expected);
   const BoardStatistics board = session.statistics();
+  if (!board.notes.empty()) return board.notes.begin()->first;
   if (board.missed_deadlines != 0) return fmt::format("{} missed deadlines", board.missed_deadlines);
   return board.serial_overruns == 0 ? "" : fmt::format("{} serial overruns", board.serial_overruns);
 }

@@ -35,6 +35,7 @@ class ChipBench {
   }
   /// Replaces the first instructions of a function of the running image. Precondition: it has the function.
   void patch(const std::string& function, const std::vector<uint16_t>& code) {
+    desk.planted = "fault: ";
     replaced_at_ = symbols.address_of(function).value();
     std::vector<uint8_t> bytes(2 * code.size());
     std::memcpy(bytes.data(), code.data(), bytes.size());

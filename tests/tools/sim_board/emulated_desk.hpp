@@ -2,6 +2,8 @@
 // The daemon's own controller client before the real image: its clock is the board's, its line the board's serial
 // port. No threads, no devices.
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <deque>
 #include <functional>
@@ -21,6 +23,14 @@ class EmulatedDesk final : public Clock {
  public:
   explicit EmulatedDesk(const std::string& image, SimBoardOptions options = {})
       : controller({read_image(image)}, {}, options) {}
+  EmulatedDesk(const EmulatedDesk&) = delete;
+  EmulatedDesk& operator=(const EmulatedDesk&) = delete;
+  /// Whatever happened, no register was used otherwise than the manual says (register_facts.hpp).
+  ~EmulatedDesk() override {
+    for (const auto& [what, note] : controller.board().statistics().notes)
+      if (planted.empty() || what.find(planted) == std::string::npos)
+        ADD_FAILURE() << what << ", " << note.count << " times, first at " << note.first_ns << " ns";
+  }
 
   /// Something that happens to the board at a time to come, while it runs.
   void at(uint64_t time_ns, std::function<void()> happens) { plans_.emplace(time_ns, std::move(happens)); }
@@ -37,6 +47,7 @@ class EmulatedDesk final : public Clock {
   }
 
   EmulatedController controller;
+  std::string planted;  ///< what the notes of a fault say that a test has made
   std::deque<uint8_t> to_host;
   std::vector<sim_controller::PinEdge> edges;
 

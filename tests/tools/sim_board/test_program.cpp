@@ -91,7 +91,7 @@ TEST_F(Program, FlashIsKeptBetweenRunsAndPowerComesBackAfterACut) {
 TEST_F(Program, RefusesBadInputWithPlaceAndRemedy) {
   const Outcome missing = call("no-such.bin --seconds 1");
   EXPECT_EQ(missing.code, 2);
-  EXPECT_THAT(missing.err, HasSubstr("no-such.bin: cannot be read"));
+  EXPECT_THAT(missing.err, HasSubstr("no-such.bin: cannot be opened"));
   const Outcome address = call(image("steps.bin") + "@0x080fffff --seconds 1");
   EXPECT_EQ(address.code, 2);
   EXPECT_THAT(address.err, HasSubstr("do not fit"));

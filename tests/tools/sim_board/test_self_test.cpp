@@ -145,6 +145,7 @@ TEST_F(SelfTest, AWrongSupplyIsSeen) {
 
 TEST_F(SelfTest, AWrongClockIsSeen) {
   power({}, {.crystal_Hz = 8'008'000});
+  bench->desk.planted = "outside the datasheet";
   EXPECT_THAT(failed(measure(10)), ElementsAre("clock"));
 }
 
