@@ -276,6 +276,7 @@ BoardStatistics SimBoard::statistics() const {
   found.stack_top = chip.memory.word(0).value_or(0);
   found.stack_used_bytes = board.stack_used();
   found.flash_operations = chip.flash.operations();
+  found.flash_broken_off = chip.flash.broken_off();
   found.serial_overruns = chip.serial_overruns();
   found.missed_deadlines = board.missed;
   for (uint32_t number = 0; number < board_model::exception_count; ++number) {

@@ -71,6 +71,7 @@ struct BoardStatistics {
   uint32_t stack_top = 0;         ///< initial stack pointer
   uint32_t stack_used_bytes = 0;  ///< deepest word touched below stack_top since power-up
   uint64_t flash_operations = 0;
+  uint64_t flash_broken_off = 0;  ///< of them, by a reset or a failing supply
   uint64_t serial_overruns = 0;
   uint64_t missed_deadlines = 0;
   std::vector<InterruptStatistics> interrupts;

@@ -19,6 +19,7 @@
 #include <optional>
 #include <random>
 #include <span>
+#include <vector>
 
 #include "tools/sim_board/core/memory.hpp"
 #include "tools/sim_board/core/notes.hpp"
@@ -59,7 +60,9 @@ class Flash final : public RegisterBlock {
         break;
     }
   }
+  /// What a reset or a failing supply finds in progress is left half done.
   void reset() override {
+    if (busy_ && clock_.now() < busy_until_ && !before_.empty()) break_off();
     acr_ = sr_ = 0;
     cr_ = locked;
     first_key_ = key_fault_ = busy_ = first_option_key_ = false;
@@ -96,18 +99,16 @@ class Flash final : public RegisterBlock {
       return;
     }
     const bool whole = begin_operation(program_ns);
-    uint32_t old = 0;
-    std::memcpy(&old, &memory_[offset], bytes);
-    const uint32_t falling = old & ~value;
-    const uint32_t fallen = doubting_ ? static_cast<uint32_t>(random_()) : 0x5555'5555U;
-    const uint32_t left = whole ? old & value : old & ~(falling & fallen);
-    std::memcpy(&memory_[offset], &left, bytes);
-    if (supply_mV_ < least_supply_mV || (!whole && doubting_))
-      marginal_[offset] |= falling;
+    keep_before(offset, bytes);
+    const uint32_t old = word_of(before_.data(), bytes);
+    const uint32_t programmed = old & value;
+    std::memcpy(&memory_[offset], &programmed, bytes);
+    if (supply_mV_ < least_supply_mV)
+      marginal_[offset] |= old & ~value;
     else
       marginal_.erase(offset);
     changed(offset, bytes);
-    if (!whole && listeners_.power_cut) listeners_.power_cut();
+    if (!whole) cut();
   }
 
   /// FLASH_ACR.
@@ -138,6 +139,7 @@ class Flash final : public RegisterBlock {
       changed(offset, 4);
     }
   }
+  [[nodiscard]] uint64_t broken_off() const { return broken_off_; }
   [[nodiscard]] std::size_t marginal_words() const { return marginal_.size(); }
   /// Below it the brown-out reset holds the chip, as the options say that counted since the last reset.
   [[nodiscard]] uint32_t brown_out_mV() const {
@@ -200,6 +202,7 @@ class Flash final : public RegisterBlock {
     if ((value & option_start) == 0) return;
     if (busy_) return notes_.add("option bytes written while flash is busy");
     if (supply_mV_ < least_supply_mV) notes_.add("option bytes written below 2.7 V");
+    before_.clear();
     if (begin_operation(program_ns))
       options_ = value & option_bits;
     else if (listeners_.power_cut)
@@ -235,16 +238,49 @@ class Flash final : public RegisterBlock {
       return;
     }
     const bool whole = begin_operation(duration_ns);
-    const uint32_t done = whole || (doubting_ && random_() % 2 == 0) ? bytes : bytes / 2;
-    std::fill_n(memory_.begin() + first, done, uint8_t{0xff});
+    keep_before(first, bytes);
+    std::fill_n(memory_.begin() + first, bytes, uint8_t{0xff});
     marginal_.erase(marginal_.lower_bound(first), marginal_.lower_bound(first + bytes));
-    if (supply_mV_ < least_supply_mV || (!whole && doubting_)) {
-      constexpr uint32_t words_a_weak_bit = 16;
-      for (uint32_t at = first; at < first + bytes; at += 4 * words_a_weak_bit)
-        marginal_[at + 4 * static_cast<uint32_t>(random_() % words_a_weak_bit)] = 1U << random_() % 32;
-    }
+    if (supply_mV_ < least_supply_mV) weaken(first, bytes);
     changed(first, bytes);
-    if (!whole && listeners_.power_cut) listeners_.power_cut();
+    if (!whole) cut();
+  }
+  void keep_before(uint32_t first, uint32_t bytes) {
+    before_at_ = first;
+    before_.assign(memory_.begin() + first, memory_.begin() + first + bytes);
+  }
+  static uint32_t word_of(const uint8_t* place, uint32_t bytes) {
+    uint32_t word = 0;
+    std::memcpy(&word, place, bytes);
+    return word;
+  }
+  /// Single bits of an erase that are neither.
+  void weaken(uint32_t first, uint32_t bytes) {
+    constexpr uint32_t words_a_weak_bit = 16;
+    for (uint32_t at = first; at < first + bytes; at += 4 * words_a_weak_bit)
+      marginal_[at + 4 * static_cast<uint32_t>(random_() % words_a_weak_bit)] = 1U << random_() % 32;
+  }
+  /// The operation in progress, or just begun, ends in its middle: some bits of a word have fallen, half of a sector is erased.
+  void break_off() {
+    ++broken_off_;
+    const auto bytes = static_cast<uint32_t>(before_.size());
+    if (bytes <= 4) {
+      const uint32_t old = word_of(before_.data(), bytes);
+      const uint32_t falling = old & ~word_of(&memory_[before_at_], bytes);
+      const uint32_t left = old & ~(falling & (doubting_ ? static_cast<uint32_t>(random_()) : 0x5555'5555U));
+      std::memcpy(&memory_[before_at_], &left, bytes);
+      if (doubting_) marginal_[before_at_] |= falling;
+    } else {
+      const uint32_t done = doubting_ && random_() % 2 == 0 ? bytes : bytes / 2;
+      std::copy(before_.begin() + done, before_.end(), memory_.begin() + before_at_ + done);
+      if (doubting_) weaken(before_at_, bytes);
+    }
+    changed(before_at_, bytes);
+    busy_ = false;
+  }
+  void cut() {
+    break_off();
+    if (listeners_.power_cut) listeners_.power_cut();
   }
   bool begin_operation(uint64_t duration_ns) {
     ++operations_;
@@ -279,7 +315,9 @@ class Flash final : public RegisterBlock {
   bool first_key_ = false, key_fault_ = false;
   bool busy_ = false;
   Cycles busy_until_ = 0;
-  uint64_t operations_ = 0;
+  uint64_t operations_ = 0, broken_off_ = 0;
+  uint32_t before_at_ = 0;
+  std::vector<uint8_t> before_;  ///< what the last operation found
   std::optional<uint64_t> cut_at_;
 };
 

@@ -187,7 +187,8 @@ void Cpu::block(uint64_t address, uint32_t bytes) {
     return stop(Stop::exception_return);
   }
   const bool in_flash = pc_ - flash_base < flash_bytes;
-  if (in_flash && parts_.flash.busy_until() > clock.now()) clock.set_now(parts_.flash.busy_until());
+  if (in_flash && parts_.flash.busy_until() > clock.now())
+    clock.set_now(std::min(parts_.flash.busy_until(), std::max(limit_, clock.now())));
   if (parts_.scheduler.next() <= clock.now()) parts_.scheduler.run_until(clock.now());
   if (stop_ != Stop::none) return stop(stop_);
   if (clock.now() >= limit_) return stop(Stop::limit);
