@@ -91,7 +91,7 @@ ExitCode check_file(const std::string& file, size_t threads, const CommandOutput
     nlohmann::ordered_json json;
     json["effects"].push_back(to_json(*effect));
     for (const explain::EffectCheck& check : checks)
-      json["checks"].push_back({DIASTOLE_NAMED(check, name, passed, detail)});
+      json["checks"].push_back({{"outcome", check.outcome()}, DIASTOLE_NAMED(check, name, passed, detail)});
     std::cout << json_text(json, 1) << '\n';
   } else {
     fmt::print("\n  Checks\n");

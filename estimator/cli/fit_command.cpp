@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iostream>
+#include <iterator>
 #include <memory>
 #include <optional>
 
@@ -16,6 +17,7 @@
 #include "estimator/fit/study_fit.hpp"
 #include "estimator/io/study_fingerprint.hpp"
 #include "estimator/io/whole_file.hpp"
+#include "estimator/model/affected_model.hpp"
 #include "estimator/model/unloaded_model.hpp"
 #include "estimator/reconstruction/study_reconstruction.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -189,7 +191,6 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
   } else {
     remark_on_imaged_load(study, "fit");
   }
-  remark_on_model(study);
   const Measurement measurement = read_measurement(study);
   StudyFitOptions options;
   if (loop) options.work = measured_work(*loop, measurement, *arguments.energy);
@@ -198,6 +199,7 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
                                       : fmt::format("{} tag points", measurement.tags.size()),
              measurement.frames.size());
   std::vector<Finding> findings = examined(arguments, study, measurement);
+  std::ranges::copy(model_findings(study), std::back_inserter(findings));
   if (has_error(findings)) return refuse_data(refused_fit(study, measurement, std::move(findings)), out);
   options.iteration_limit = arguments.iteration_limit;
   options.robustness = arguments.robust == "yes"  ? Robustness::always

@@ -269,8 +269,8 @@ ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
   require_one_load(arguments);
   const Study study = read_study(arguments.study);
   require_frames(arguments, study);
-  remark_on_model(study);
   arguments.outputs.require(study, arguments.frames);
+  remark_on_model(study);
   SolveOptions options = with_progress("solve");
   options.check_stability = true;
   std::optional<UnloadedModel> unloaded;

@@ -113,7 +113,7 @@ std::vector<double> degrees(const Eigen::VectorXd& radians) {
 FibresThroughPoints fibres_through_points(const HermiteMesh& mesh, std::span<const FibrePoint> points) {
   const std::vector<double> depths = NodalLines(mesh).depths();
   const std::vector<Seen> seen = seen_in(mesh, points, depths);
-  if (seen.size() < least_points || 2 * seen.size() < points.size())
+  if (seen.size() < least_points || 5 * seen.size() < points.size())
     throw std::invalid_argument(std::to_string(seen.size()) + " of " + std::to_string(points.size()) +
                                 " points lie in the mesh");
   HelixCourse course;

@@ -23,7 +23,7 @@ struct FibresThroughPoints {
   double rms_deg = 0;  ///< between the points' directions and the field's
 };
 
-/// Throws std::invalid_argument if fewer than 8 points lie in the mesh, or fewer than half of them: they are another specimen's.
+/// Throws std::invalid_argument if fewer than 8 points lie in the mesh, or fewer than a fifth of them: they are another specimen's.
 FibresThroughPoints fibres_through_points(const HermiteMesh& mesh, std::span<const FibrePoint> points);
 
 }  // namespace diastole

@@ -96,7 +96,7 @@ MeshBody refined(MeshBody body, const std::array<int, 3>& halvings) {
   return body;
 }
 
-/// Measured fibres in place of assumed ones. Without [images.to_specimen] the points are in the specimen's own axes.
+/// Without [images.to_specimen] the points are in the specimen's own axes.
 std::vector<FibrePoint> measured_directions(const Study& study) {
   const Placement to_images = placement_of(study);
   std::vector<FibrePoint> points;
@@ -107,6 +107,7 @@ std::vector<FibrePoint> measured_directions(const Study& study) {
   return points;
 }
 
+/// In place of assumed ones.
 FibresThroughPoints measured_fibres(const Study& study, const HermiteMesh& mesh,
                                     const std::vector<FibrePoint>& points) {
   try {

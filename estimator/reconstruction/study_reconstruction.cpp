@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <mutex>
+#include <numeric>
 
 #include "estimator/model/study_model.hpp"
 #include "estimator/motion_residuals/motion_residuals.hpp"
@@ -86,8 +87,13 @@ void judge(StudyReconstruction& result, const Study& study, const Measurement& m
   result.amplitudes = motion_amplitudes(forms, result.fields, TagPlanes(measurement));
   result.families = family_fits(result.fields, result.groups, measurement.tags.size());
   result.slices = slice_offsets(result.fields, result.groups, measurement.tags);
+  const auto motion = [](const FrameField& field) {
+    return std::inner_product(field.displacement_mm.begin(), field.displacement_mm.end(),
+                              field.displacement_mm.begin(), 0.0);
+  };
+  const FrameField& largest = *std::ranges::max_element(result.fields, {}, motion);
   for (const FrameField& field : result.fields)
-    result.volumes.push_back(check_volume(forms, field, most_loaded(result.fields)));
+    result.volumes.push_back(check_volume(forms, field, largest));
   if (!options.quick) result.coverage = coverage_of(forms, most_loaded(result.fields));
   const std::vector<Finding> found = motion_findings(result);
   result.findings.insert(result.findings.end(), found.begin(), found.end());

@@ -69,14 +69,14 @@ VolumeCheck check_volume(const FieldForms& forms, const FrameField& field, const
     moved_mm3 += element_mm3;
     check.elements.push_back({element_mm3 / forms.sobolev.element_volume_mm3[e], 0.0});
   }
-  const double volume_mm3 = forms.sobolev.volume_mm3;
-  check.mean_ratio = moved_mm3 / volume_mm3;
-  check.rms = std::sqrt(check.rms / volume_mm3);
-  of_body /= volume_mm3;
+  const double rest_mm3 = forms.sobolev.volume_mm3;
+  check.mean_ratio = moved_mm3 / rest_mm3;
+  check.rms = std::sqrt(check.rms / rest_mm3);
+  of_body /= rest_mm3;
   const SmoothedSystem& system = *field.system;
   for (const Eigen::VectorXd& motion : {system.solution(), scaled_to(system, largest.system->solution())})
     check.smoothing_error =
-        std::max(check.smoothing_error, std::abs(smoothing_error_mm3(forms, system, motion)) / volume_mm3);
+        std::max(check.smoothing_error, std::abs(smoothing_error_mm3(forms, system, motion)) / rest_mm3);
   check.se = std::hypot(std::sqrt(of_body.dot(field.system->solve(of_body).col(0))), check.smoothing_error);
   const std::vector<double> variances = field.system->variances(of_elements);
   for (size_t e = 0; e < variances.size(); ++e)
@@ -87,7 +87,7 @@ VolumeCheck check_volume(const FieldForms& forms, const FrameField& field, const
   for (const auto& [error, part_mm3] : errors) {
     below_mm3 += part_mm3;
     check.p95 = error;
-    if (below_mm3 >= 0.95 * volume_mm3) break;
+    if (below_mm3 >= 0.95 * rest_mm3) break;
   }
   return check;
 }

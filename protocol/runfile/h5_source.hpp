@@ -184,8 +184,9 @@ class H5Source {
   [[nodiscard]] const std::string& file() const { return name_; }
 
  private:
-  // Larger claims are a damaged header, not a recording: three hours at 10 kHz; of what is listed beside it 50 each second.
-  static constexpr hsize_t most_samples = hsize_t{1} << 27, most_rows = hsize_t{1} << 19;
+  // Larger claims are a damaged header, not a recording: three hours at 10 kHz, and cycles of more than the ten million that a
+  // segment may have (host/config/experiment.cpp).
+  static constexpr hsize_t most_samples = hsize_t{1} << 27, most_rows = hsize_t{1} << 24;
   /// The library's own choice is a megabyte at most, the daemon's 32 KB.
   static constexpr uint64_t most_chunk_bytes = uint64_t{16} << 20;
   static constexpr size_t most_text_bytes = size_t{1} << 28;
@@ -392,7 +393,8 @@ class H5Source {
     hsize_t rows = 0;
     if (H5Sget_simple_extent_ndims(space.get()) != 1) fail("dataset " + path, "is not one-dimensional");
     H5Sget_simple_extent_dims(space.get(), &rows, nullptr);
-    if (rows > most) fail("dataset " + path, fmt::format("claims {} rows", rows));
+    if (rows > most)
+      fail("dataset " + path, fmt::format("claims {} rows, and up to {} are read", rows, most), tampered);
     return static_cast<size_t>(rows);
   }
   /// To convert rows HDF5 takes and clears a buffer of a megabyte, each time, unless it is told of a smaller one: more work than

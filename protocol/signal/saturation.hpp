@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <initializer_list>
 #include <limits>
+#include <utility>
 
 namespace diastole::signal {
 
@@ -22,6 +23,7 @@ class SaturationWatch {
  public:
   /// Some equal samples happen at the extreme of a long recording's noise, where it is a few codes; six hardly ever do.
   static constexpr int64_t kLeastRun = 6;
+  /// Seconds of a recording: a converter's noise of a tenth of a code would have shown another one.
   static constexpr int64_t kLeastStill = 1000;
   /// A signal at rest flickers between neighbouring codes; one that is cut off has been moving on.
   static constexpr double kLeastStep_codes = 4;
@@ -56,6 +58,7 @@ class SaturationWatch {
   void finish() {
     if (left_.samples > 0) end_run(left_by_);
     break_off();
+    judge(std::exchange(first_, {}), kUnknown, first_left_by_);
   }
 
   /// At the greatest and the least value, so far; a run that has not ended does not count.
@@ -67,15 +70,21 @@ class SaturationWatch {
 
  private:
   void end_run(double left_by) {
+    const Saturated run = std::exchange(left_, {});
+    const bool is_first = std::isnan(left_entered_by_) && values_ <= run.samples + 2;
+    if (!is_first) return judge(run, left_entered_by_, left_by);
+    first_ = run;  // how large a code is is not known yet
+    first_left_by_ = left_by;
+  }
+  void judge(const Saturated& run, double entered_by, double left_by) {
     const double enough = std::fmax(kLeastStep_codes * code_, kLeastStep_part * (most_.value - least_.value));
-    const bool is_cut_off = !(left_entered_by_ < enough) && !(left_by < enough) &&
-                            !(std::isnan(left_entered_by_) && std::isnan(left_by));
+    const bool is_cut_off =
+        !(entered_by < enough) && !(left_by < enough) && !(std::isnan(entered_by) && std::isnan(left_by));
     for (Saturated* end : {&most_, &least_}) {
-      if (left_.value != end->value || !is_cut_off) continue;
-      end->samples += left_.samples;
+      if (run.samples == 0 || run.value != end->value || !is_cut_off) continue;
+      end->samples += run.samples;
       ++end->runs;
     }
-    left_.samples = 0;
   }
   void break_off() {
     if (run_ >= kLeastRun) {
@@ -96,6 +105,8 @@ class SaturationWatch {
   double entered_by_ = 0;  ///< the run of equal values up to the last one; kUnknown after a gap
   int64_t run_ = 0;
   int64_t values_ = 0;
+  Saturated first_;  ///< the run that the recording begins with, once it has ended
+  double first_left_by_ = kUnknown;
   Saturated left_;  ///< a run that the last value has left: the next one tells by what steps
   double left_by_ = 0;
   double left_entered_by_ = 0;

@@ -110,14 +110,16 @@ std::vector<std::optional<LogGain>> gains_of(const DiffusionSeries& series, cons
   return gains;
 }
 
-/// The images of about one b value, of those that are predicted; nothing where they are too few to have a middle.
+/// Of the images of about one b value that are predicted: their middle, or of few, of which one that is off moves it, the least.
 std::optional<double> shell_gain(const DiffusionSeries& series, const SliceSignals& signals,
                                  const std::vector<std::optional<LogGain>>& gains, double b_s_mm2) {
   std::vector<double> shell;
   for (size_t i = 0; i < gains.size(); ++i)
     if (gains[i] && is_one_shell(series.volumes[signals.volumes[i]].b_s_mm2(), b_s_mm2))
       shell.push_back(gains[i]->middle);
-  return shell.size() >= least_in_shell ? std::optional(signal::median(std::move(shell))) : std::nullopt;
+  if (shell.size() < 2) return std::nullopt;  // it may be the one that is off
+  if (shell.size() >= least_in_shell) return signal::median(std::move(shell));
+  return *std::ranges::min_element(shell, {}, [](double gain) { return std::abs(gain); });
 }
 
 struct Outlier {

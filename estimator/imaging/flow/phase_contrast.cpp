@@ -149,30 +149,24 @@ void require_phases(const ImageFolder& folder, const ImageSeries& series, const 
            "Export the series again; or --bridge-gaps goes across, with the larger error that this costs.");
 }
 
-/// The venc that the headers state; nothing if none.
-std::optional<double> stated_venc(const ImageHeader& header, const std::string& file) {
-  try {
-    return velocity_scale(header, {}, {}, file).venc_cm_s;
-  } catch (const InputError&) {
-    return {};
-  }
-}
-
 /// What was asked for is taken, and said to differ where it does: a slip of a finger scales every flow.
 void add_contradictions(PhaseContrast& scan, const PhaseContrastRequest& request, const ImageHeader& header,
-                        std::optional<double> interval_ms, const std::string& file) {
+                        std::optional<double> interval_ms) {
   constexpr double differs = 0.02;
   const auto add = [&](const char* id, std::string what, double number, const char* unit,
                        const char* remedy) {
     scan.findings.push_back({Severity::warning, id, std::move(what), scan.name, number, unit, remedy});
   };
-  const std::optional<double> venc = request.venc_cm_s ? stated_venc(header, file) : std::nullopt;
-  if (venc && std::abs(scan.venc_cm_s / *venc - 1) > differs)
+  if (request.reverse)
+    scan.findings.push_back({Severity::note, "reversed", "flow against the slice's normal counts as positive",
+                             scan.name, -1, "", "--reverse asked for it."});
+  if (request.venc_cm_s && header.velocity &&
+      std::abs(scan.venc_cm_s / header.velocity->venc_cm_s - 1) > differs)
     add("venc-contradicted",
         fmt::format(
             "--venc {:g} contradicts the headers, which state {:g} cm/s: all flow is in proportion to it",
-            scan.venc_cm_s, *venc),
-        *venc, "cm/s", "Leave --venc away unless the headers are known to be wrong.");
+            scan.venc_cm_s, header.velocity->venc_cm_s),
+        header.velocity->venc_cm_s, "cm/s", "Leave --venc away unless the headers are known to be wrong.");
   if (request.interval_s && interval_ms) {
     const double cycles = scan.interval_s / (1e-3 * *interval_ms);
     const double whole = std::max(1.0, std::round(cycles));
@@ -238,7 +232,7 @@ PhaseContrast phase_contrast(const ImageFolder& folder, const PhaseContrastReque
                        scan.interval_s, span_s),
            "Give the time after which the flow repeats with --period; gated on every second R-wave it is two "
            "cycles.");
-  add_contradictions(scan, request, folder.images[slice.images[0]].header, series.interval_ms, file);
+  add_contradictions(scan, request, folder.images[slice.images[0]].header, series.interval_ms);
   return scan;
 }
 

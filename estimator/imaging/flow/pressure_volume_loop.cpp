@@ -64,9 +64,11 @@ double correlation(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
 /// What the pump was commanded to at these times of a cycle, mL; empty without a pump's record of a whole one.
 Eigen::VectorXd pumped_mL(const runfile::RunFile& file, size_t segment, const Eigen::VectorXd& time_s) {
   if (file.rows.pump.time_s.size() == 0) return {};
-  const double start_s = file.run.segments.at(segment).start_s;
+  const std::vector<runfile::Segment>& segments = file.run.segments;
+  const double start_s = segments.at(segment).start_s;
   for (const double trigger_s : file.run.trigger_s) {
     if (trigger_s < start_s) continue;
+    if (segment + 1 < segments.size() && trigger_s >= segments[segment + 1].start_s) break;
     runfile::CommandedVolume pump(file.rows.pump);
     const Eigen::VectorXd volume =
         time_s.unaryExpr([&](double after_s) { return pump.at(trigger_s + after_s); });
@@ -80,11 +82,16 @@ void compare_with_pump(PressureVolumeLoop& loop, const runfile::RunFile& file,
                        const Eigen::VectorXd& time_s) {
   constexpr double opposed = -0.5;  // of a correlation: a quarter of a cycle late is none
   const auto count = static_cast<Eigen::Index>(loop.points.size());
+  double sigma_mL = 0;
   Eigen::VectorXd volume(count), pressure(count);
   for (Eigen::Index i = 0; i < count; ++i) {
     volume[i] = loop.points[static_cast<size_t>(i)].volume_mL.value;
     pressure[i] = loop.points[static_cast<size_t>(i)].pressure_kPa.value;
+    sigma_mL = std::max(sigma_mL, loop.points[static_cast<size_t>(i)].volume_mL.sigma);
   }
+  const double measured_mL = volume.maxCoeff() - volume.minCoeff();
+  constexpr double clear_sigmas = 5.0;
+  if (measured_mL < clear_sigmas * sigma_mL) return;  // noise correlates with anything
   const char* remedy =
       "If the slice's normal points out of the specimen, say --reverse; else this is another run's flow.";
   const Eigen::VectorXd pump = pumped_mL(file, loop.segment, time_s);
@@ -94,10 +101,9 @@ void compare_with_pump(PressureVolumeLoop& loop, const runfile::RunFile& file,
           {loop.source, fmt::format("segment {}", loop.segment),
            fmt::format("the measured volume falls while the pump fills (correlation {:.2f})", with_pump),
            remedy});
-    const double measured_mL = volume.maxCoeff() - volume.minCoeff();
     const double stroke_mL = pump.maxCoeff() - pump.minCoeff();
     constexpr double more = 1.1;  // ringing lines overshoot by less
-    if (measured_mL > more * stroke_mL)
+    if (stroke_mL > 0 && measured_mL > more * stroke_mL)
       loop.findings.push_back(
           {Severity::warning, "more-than-pumped",
            fmt::format("flow brings {:.1f} mL, and the pump gives {:.1f} mL", measured_mL, stroke_mL),

@@ -180,8 +180,7 @@ class CineFinder {
     read_slices(folder);
     find_axis();
     name_slices();
-    for (size_t p = 0; p < slices_[0].images.size(); ++p)
-      guide_.phases.push_back(static_cast<int>(p));
+    number_phases();
     for (const CineSlice& slice : slices_)
       guide_.slices.push_back(slice.name);
   }
@@ -209,11 +208,23 @@ class CineFinder {
     throw InputError({guide_.file, "", problem, remedy});
   }
 
+  static std::vector<double> triggers_ms(const ImageFolder& folder, const SliceImages& slice) {
+    std::vector<double> times_ms;
+    for (const size_t image : slice.images)
+      if (const auto& trigger_ms = folder.images[image].header.trigger_ms) times_ms.push_back(*trigger_ms);
+    return times_ms;
+  }
+  /// Of one slice by itself, with those that are missing between its others.
+  static PhaseTimes times_of(const ImageFolder& folder, const SliceImages& slice) {
+    return phase_times(std::vector<std::vector<double>>{triggers_ms(folder, slice)});
+  }
+
   /// Of the cine slices: phase contrast's magnitudes, one slice of more phases, look like a cine.
   static size_t phases_of_most(const ImageFolder& folder) {
     std::map<size_t, size_t> slices;
     for (const ImageSeries& series : folder.series)
-      if (series.kind == SeriesKind::cine) slices[series.phases.times_ms.size()] += series.slices.size();
+      for (const SliceImages& slice : series.slices)
+        if (series.kind == SeriesKind::cine) ++slices[times_of(folder, slice).times_ms.size()];
     const auto most = std::ranges::max_element(slices, {}, [](const auto& count) { return count.second; });
     return most == slices.end() ? 0 : most->first;
   }
@@ -222,27 +233,23 @@ class CineFinder {
   static std::optional<PhaseTimes> times_in_common(const ImageFolder& folder, size_t phases) {
     std::vector<std::vector<double>> times_ms;
     for (const ImageSeries& series : folder.series) {
-      if (series.kind != SeriesKind::cine || series.phases.times_ms.size() > phases) continue;
-      for (const SliceImages& slice : series.slices) {
-        if (2 * slice.images.size() <= phases) continue;
-        times_ms.emplace_back();
-        for (const size_t image : slice.images)
-          if (const auto& trigger_ms = folder.images[image].header.trigger_ms)
-            times_ms.back().push_back(*trigger_ms);
-      }
+      if (series.kind != SeriesKind::cine) continue;
+      for (const SliceImages& slice : series.slices)
+        if (2 * slice.images.size() > phases && times_of(folder, slice).times_ms.size() <= phases)
+          times_ms.push_back(triggers_ms(folder, slice));
     }
     PhaseTimes times = phase_times(times_ms);
     return times.times_ms.size() == phases ? std::optional(std::move(times)) : std::nullopt;
   }
 
-  /// Images by phase: of times that all slices have in common, else of each series' own.
+  /// Images by phase: of times that all slices have in common, else of each slice's own, as where the heart's rate changed.
   void read_slices(const ImageFolder& folder) {
     const size_t phases = phases_of_most(folder);
     const std::optional<PhaseTimes> common = times_in_common(folder, phases);
     for (const ImageSeries& series : folder.series) {
       if (series.kind != SeriesKind::cine) continue;
-      const PhaseTimes& times = common ? *common : series.phases;
       for (const SliceImages& slice : series.slices) {
+        const PhaseTimes times = common ? *common : times_of(folder, slice);
         CineSlice one;
         one.plane = slice.plane;
         one.images.resize(phases);
@@ -342,6 +349,21 @@ class CineFinder {
       slope += height * static_cast<double>((slice.first_image() > slice.levels.inner()).count());
     }
     return slope > 0;
+  }
+
+  /// Those that some slice shows, by their numbers.
+  void number_phases() {
+    const size_t all = slices_[0].images.size();
+    for (size_t p = 0; p < all; ++p)
+      if (std::ranges::any_of(slices_, [&](const CineSlice& slice) { return slice.has(p); }))
+        guide_.phases.push_back(static_cast<int>(p));
+    if (guide_.phases.size() == all) return;
+    for (CineSlice& slice : slices_) {
+      std::vector<Eigen::ArrayXXd> shown;
+      for (const int p : guide_.phases)
+        shown.push_back(std::move(slice.images[static_cast<size_t>(p)]));
+      slice.images = std::move(shown);
+    }
   }
 
   void name_slices() {

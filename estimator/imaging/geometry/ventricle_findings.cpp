@@ -40,7 +40,7 @@ void add_no_points(std::vector<Finding>& findings, const GuidePoints& guide,
     if (slices[s].points == 0) names.push_back(guide.slices[s]);
   if (names.empty()) return;
   findings.push_back(
-      {Severity::warning, "no-points",
+      {Severity::note, "no-points",
        fmt::format("{} of {} slices have no points of a wall: where they lie is not measured", names.size(),
                    slices.size()),
        fmt::format("slice {}", fmt::join(names, ", ")), static_cast<double>(names.size()), "",

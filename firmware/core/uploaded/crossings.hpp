@@ -6,8 +6,8 @@
 // and kept as whole + rest / N, levels follow from one another by exact additions. On its way through the points
 // only integers are compared; within the interval found, the crossing is the root of a cubic (knot_cubic.hpp)
 // between the last crossing, or the interval's beginning, and its end: Newton's method, held in the bracket by
-// halving it, in units of 2^-42 of the interval. Quotients are single precision, which IEEE 754 rounds alike
-// everywhere; the residual is exact integer arithmetic, so the result does not depend on them.
+// halving it, in units of 2^-42 of the interval. Steps are single precision, which IEEE 754 rounds alike
+// everywhere; the residual is exact integer arithmetic, and a step after which nothing is looked at is below 2^20, so right to one.
 //
 // Where the curve turns less than 1/8 of a microstep behind a level it goes back unnoticed: without that, two
 // opposite steps could come at any distance. What was let go is made good where the curve turns next and goes

@@ -5,9 +5,11 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <sstream>
 
 #include "estimator/io/fibre_points.hpp"
+#include "estimator/model/study_model.hpp"
 #include "tests/estimator/cli/run_command.hpp"
 #include "tests/estimator/imaging/diffusion_scan.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
@@ -90,6 +92,30 @@ TEST_F(FibresCommand, MeasuresAFieldThatAStudyTakes) {
   const double assumed = volume_mL("assumed.study.toml");
   EXPECT_NEAR(volume_mL("measured.study.toml"), assumed, 0.02 * assumed);
   EXPECT_GT(std::abs(volume_mL("heart.study.toml") - assumed), 0.05 * assumed);
+}
+
+TEST_F(FibresCommand, FibresOfAnotherSpecimenAreTold) {
+  (void)output({"--study", path("heart.study.toml"), "-o", path("heart.fibres.csv")});
+  std::vector<FibrePointRow> rows = read_fibre_points(path("heart.fibres.csv"));
+  const auto told = [&] {
+    folder_.write("other.fibres.csv", fibre_points_text(rows));
+    folder_.write("other.study.toml", study("fibres = \"other.fibres.csv\"\n"));
+    std::string ids;
+    for (const Finding& finding : fibre_findings(read_study(path("other.study.toml"))))
+      ids += finding.id + " ";
+    return ids;
+  };
+  EXPECT_EQ(told(), "");
+  std::mt19937 random(2);
+  std::normal_distribution<double> normal;
+  for (FibrePointRow& row : rows) {
+    const Eigen::Vector3d any = Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
+    row.direction = {any.x(), any.y(), any.z()};
+  }
+  EXPECT_EQ(told(), "fibres-misfit ");
+  for (size_t i = 0; i < rows.size(); i += 2)
+    rows[i].place_mm[0] += 500;
+  EXPECT_EQ(told(), "fibres-beside fibres-misfit ");
 }
 
 TEST_F(FibresCommand, GivesTheFieldAtPlaces) {

@@ -77,6 +77,14 @@ TEST(AffectedModel, LeavesTheSpecimenWhereOnlyTheRigIsConcerned) {
   EXPECT_EQ(volume_change_mL(gel({"hose-compliance"})), volume_change_mL(gel({})));
 }
 
+TEST(AffectedModel, SaysWhichEffectsOfTheSpecimenRecordingsAloneShow) {
+  const std::vector<Finding> found = model_findings(gel({"viscoelasticity", "hose-compliance"}));
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].id, "effect-of-recordings");
+  EXPECT_TRUE(found[0].what.starts_with("viscoelasticity "));
+  EXPECT_TRUE(model_findings(gel({})).empty());
+}
+
 TEST(AffectedModel, GelHasOffsetsOfTheRigAndNoFibres) {
   EXPECT_FALSE(shows_in_images(gel({"sensor-offset"})));
   EXPECT_EQ(volume_change_mL(gel({"sensor-offset"})), volume_change_mL(gel({})));

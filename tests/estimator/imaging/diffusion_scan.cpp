@@ -84,9 +84,11 @@ std::vector<std::vector<std::vector<double>>> signals_of(const DiffusionScan& sc
       }
       for (size_t v = 0; v < volumes.size(); ++v) {
         double signal = 20 * empty;  // PFPE: dark
-        for (const Eigen::Matrix3d& tensor : tensors)
-          signal +=
-              1000 * std::exp(-1e-3 * volumes[v].first * volumes[v].second.dot(tensor * volumes[v].second));
+        for (const Eigen::Matrix3d& tensor : tensors) {
+          const double weighting =
+              1e-3 * volumes[v].first * volumes[v].second.dot(tensor * volumes[v].second);
+          signal += 1000 * std::exp(-weighting + scan.kurtosis * weighting * weighting / 6);
+        }
         signal /= parts * parts * parts;
         if (scan.faded.contains({static_cast<int>(v), slice})) signal *= 0.5;
         const double imaginary = scan.noise * noise(engine), real = signal + scan.noise * noise(engine);
@@ -139,6 +141,8 @@ std::vector<std::pair<double, Eigen::Vector3d>> DiffusionScan::volumes() const {
     const double radius = std::sqrt(1 - z * z);
     all.emplace_back(1000.0, Eigen::Vector3d(radius * std::cos(around), radius * std::sin(around), z));
   }
+  for (size_t v = 2; second_shell && v < 2 + directions; ++v)
+    all.emplace_back(2000.0, all[v].second);
   return all;
 }
 

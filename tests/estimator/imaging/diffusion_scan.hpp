@@ -28,12 +28,15 @@ struct DiffusionScan {
   std::set<std::pair<int, int>> faded = {};    ///< (volume, slice) that lost half of their signal
   std::set<int> absent_volumes = {};           ///< that are not there at all
   bool isotropic = false;
+  bool second_shell = false;  ///< the same directions at b 2000 besides
+  double kurtosis =
+      0;  ///< ln S = -b D + K (b D)^2 / 6 (J. H. Jensen et al., Magn. Reson. Med. 53 (2005) 1432)
   double endo_deg = 60, epi_deg = -60;
   /// Columns: the ventricle's axes, patient coordinates; slices lie across the third.
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
   Eigen::Vector3d origin_mm{4, -7, 11};
 
-  /// b (s/mm²) and direction of each volume: b = 0 twice, then 12 directions of b 1000.
+  /// b (s/mm²) and direction of each volume: b = 0 twice, then 12 directions of b 1000, and those of a second shell.
   [[nodiscard]] std::vector<std::pair<double, Eigen::Vector3d>> volumes() const;
   /// At a place of the wall (patient coordinates); nothing outside.
   [[nodiscard]] std::optional<Eigen::Vector3d> fibre(const Eigen::Vector3d& place_mm) const;

@@ -17,6 +17,7 @@
 #include "estimator/mesh/ellipsoid.hpp"
 #include "estimator/mesh/placed_mesh.hpp"
 #include "tests/estimator/imaging/diffusion_scan.hpp"
+#include "tests/estimator/imaging/finding_ids.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 
 namespace diastole::imaging {
@@ -248,6 +249,17 @@ TEST(Diffusion, ImagesThatLostSignalAreLeftOut) {
   const FibreSession kept = measured(scan, {.folder = {}, .keep_outliers = true});
   EXPECT_TRUE(kept.outliers.empty());
   EXPECT_GT(kept.tensors.sigma, 1.2 * session.tensors.sigma);
+}
+
+/// Tissue's signal falls more slowly at large b than any tensor's: no image of such a shell is an outlier, one that lost signal still is.
+TEST(Diffusion, AShellThatNoTensorExplainsIsToldAndKept) {
+  DiffusionScan scan{.noise = 15, .second_shell = true, .kurtosis = 1.8};
+  scan.faded = {{17, 3}};
+  const FibreSession session = measured(scan);
+  ASSERT_EQ(session.outliers.size(), 1U);
+  EXPECT_EQ(session.outliers[0].volume, 17U);
+  EXPECT_EQ(session.outliers[0].slice, 3U);
+  EXPECT_THAT(test::ids_of(session.findings), testing::Contains("shell-misfit"));
 }
 
 TEST(Diffusion, AMissingImageIsNamed) {

@@ -284,7 +284,7 @@ TEST(PressureVolumeLoop, FlowOutOfTheSpecimenIsNotTakenForFlowIntoIt) {
   EXPECT_THAT(measure_session(request).findings, testing::IsEmpty());
   request.scan.reverse = true;
   const FlowSession reversed = measure_session(request);
-  EXPECT_THAT(test::ids_of(reversed.findings), testing::ElementsAre("pressure-falls"));
+  EXPECT_THAT(test::ids_of(reversed.findings), testing::ElementsAre("reversed", "pressure-falls"));
   // With the pump's record it is no doubt.
   runfile::RecordedRun run = run_of_tables(*request.pressure, *request.trigger);
   run.pump = pump;

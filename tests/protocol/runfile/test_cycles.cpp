@@ -21,7 +21,7 @@ RecordedRun ten_cycles() {
     run.trigger_s.push_back(1.004 + i);
   for (int i = 0; i < 1200; ++i) {
     run.pressure.time_s.push_back(0.01 * i);
-    run.pressure.channels["cavity_kPa"].push_back(1);
+    run.pressure.channels["cavity_kPa"].push_back(i % 2 == 0 ? 1 : 1.01);
   }
   run.pump.time_s = run.pressure.time_s;
   run.pump.commanded_mL = run.pressure.channels["cavity_kPa"];

@@ -233,6 +233,16 @@ TEST(Saturation, IsCountedWhereTheRecordingBeginsOrEndsInIt) {
     EXPECT_EQ(assess(run).saturated.at("cavity_kPa"), cut_off) << at_the_begin;
   }
   RecordedRun run = regular_run();
+  std::vector<double> wave;  // which begins at its peak, leaves it in a curve and comes to rest
+  std::mt19937 random(6);
+  for (int i = 0; i < 400; ++i)
+    wave.push_back(std::clamp(std::round(12'700 * std::cos(std::min(0.05 * i, std::numbers::pi / 2)) +
+                                         static_cast<double>(random() % 3)) /
+                                  100,
+                              -100.0, 100.0));
+  run.pressure.channels["cavity_kPa"] = wave;
+  EXPECT_EQ(assess(run).saturated.at("cavity_kPa"),
+            std::ranges::count_if(wave, [](double value) { return std::abs(value) == 100; }));
   std::vector<double> values = measured(127);
   const auto whole = std::ranges::count_if(values, [](double value) { return std::abs(value) == 100; });
   const auto beyond = std::ranges::find(values, 100.0);

@@ -89,7 +89,8 @@ TEST_F(ChipFaults, ABrownOutAtAnyMomentHoldsTheChipAndLosesNoSettings) {
     } else {
       for (uint64_t after_ns = 0; after_ns < 4 * ms; after_ns += 5'000)
         bench->desk.at(now_ns + after_ns, [&, dip] {
-          if (std::exchange(seen, board().statistics().flash_operations) < seen && board().powered()) dip();
+          const uint64_t before = std::exchange(seen, board().statistics().flash_operations);
+          if (before < seen && board().powered()) dip();
         });
     }
     bool whole = true;
