@@ -206,8 +206,8 @@ void add_shell_findings(DiffusionSeries& series, const std::vector<SliceOutliers
                      "allows them",
                      b_s_mm2, 100 * gain),
          series.name, gain, "",
-         "Diffusion in tissue is slower at large b, and noise has a floor: directions stay, FA and MD are "
-         "biased. Leave the largest b values away for these."});
+         "Diffusion in tissue is slower at large b, and noise has a floor: FA and MD are biased, directions "
+         "less. Leave the largest b values away."});
   }
 }
 
