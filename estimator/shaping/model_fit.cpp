@@ -195,11 +195,10 @@ DriveModel fitted_model(const DriveModel& model, const std::vector<GatedRun>& ru
       best = found.q;
     };
     if (best) search_from(*best);
-    if (2.0 * least < problem.measured()) continue;  // nothing is left to find
-    for (const Eigen::VectorXd& start : problem.nearest_starts()) {
+    if (2.0 * least < problem.measured()) continue;  // the runs before led here
+    // From every start: a fit within the errors may be another hose's and another bubble's, and a far better one be left.
+    for (const Eigen::VectorXd& start : problem.nearest_starts())
       search_from(start);
-      if (2.0 * least < problem.measured()) break;
-    }
   }
   return best ? model.with_values(space_of(model).values(*best)) : model;
 }
