@@ -181,6 +181,16 @@ imaging::VentricleRequest checked_request(const VentricleArguments& arguments) {
   return request;
 }
 
+/// Of a file, or found in a folder's cines.
+imaging::GuidePoints given_points(const fs::path& guide,
+                                  const std::function<void(const std::string&)>& report_stage) {
+  if (!fs::is_directory(guide)) return imaging::read_guide_points(guide);
+  report_stage(fmt::format("reading {}", guide.string()));
+  const imaging::Cines cines = imaging::read_cines(guide);
+  report_stage("finding walls in the images");
+  return imaging::cine_guide_points(cines);
+}
+
 ExitCode run_ventricle(const VentricleArguments& arguments, const CommandOutput& out) {
   const auto start = std::chrono::steady_clock::now();
   const bool shows_progress = isatty(STDERR_FILENO) != 0;
@@ -188,9 +198,7 @@ ExitCode run_ventricle(const VentricleArguments& arguments, const CommandOutput&
   const auto report_stage = [&](const std::string& stage) {
     if (shows_progress) fmt::print(stderr, "{}\n", stage);
   };
-  const imaging::GuidePoints guide = fs::is_directory(request.guide)
-                                         ? imaging::cine_guide_points(request.guide, report_stage)
-                                         : imaging::read_guide_points(request.guide);
+  const imaging::GuidePoints guide = given_points(request.guide, report_stage);
   const imaging::VentricleSession session = imaging::measure_ventricle(request, guide, report_stage);
   write_whole_file(arguments.output, mesh_file_text(session.body));
   if (arguments.guide) write_whole_file(*arguments.guide, imaging::guide_file_text(guide));

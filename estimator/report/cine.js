@@ -1,3 +1,57 @@
+// A player of one slice's images, phase by phase: what is drawn over them are its overlays, in their order.
+class CinePlayer {
+  constructor(holder, slice) {
+    this.holder = holder;
+    this.slice = slice;
+    this.canvas = holder.querySelector("canvas");
+    this.range = holder.querySelector(".cine-phase");
+    this.button = holder.querySelector(".cine-play");
+    this.scale = Math.max(2, Math.round(640 / slice.columns));
+    this.canvas.width = this.scale * slice.columns;
+    this.canvas.height = Math.round(this.scale * slice.rows * slice.pixel_mm[1] / slice.pixel_mm[0]);
+    this.overlays = [];
+    this.range.addEventListener("input", () => this.draw());
+    this.button.addEventListener("click", () => this.play(this.timer === undefined));
+  }
+  get phase() { return Number(this.range.value); }
+  get image() { return this.slice.images[this.phase]; }
+  // Canvas coordinates of a place in pixels of the image, and back.
+  xy(column, row) { return [(column + 0.5) * this.canvas.width / this.slice.columns, (row + 0.5) * this.canvas.height / this.slice.rows]; }
+  place(event) {
+    const box = this.canvas.getBoundingClientRect();
+    return { column: (event.clientX - box.left) / box.width * this.slice.columns - 0.5, row: (event.clientY - box.top) / box.height * this.slice.rows - 0.5 };
+  }
+  play(on) {
+    clearInterval(this.timer);
+    this.timer = on ? setInterval(() => { this.range.value = (this.phase + 1) % this.slice.images.length; this.draw(); }, 120) : undefined;
+    this.button.textContent = on ? "\u25a0" : "\u25b6";
+  }
+  bitmap() {
+    const { slice, image } = this;
+    if (image.bitmap) return image.bitmap;
+    const grey = Uint8Array.from(atob(image.picture), (c) => c.charCodeAt(0)), data = new ImageData(slice.columns, slice.rows);
+    grey.forEach((value, i) => data.data.set([value, value, value, 255], 4 * i));
+    image.bitmap = document.createElement("canvas");
+    image.bitmap.width = slice.columns;
+    image.bitmap.height = slice.rows;
+    image.bitmap.getContext("2d").putImageData(data, 0, 0);
+    return image.bitmap;
+  }
+  draw() {
+    const context = this.canvas.getContext("2d"), image = this.image;
+    context.imageSmoothingEnabled = false;
+    context.clearRect(0, 0, this.canvas.width, this.canvas.height);
+    context.drawImage(this.bitmap(), 0, 0, this.canvas.width, this.canvas.height);
+    for (const overlay of this.overlays) overlay(context);
+    this.holder.querySelector(".cine-time").textContent = `phase ${image.frame}, ${image.trigger_ms.toFixed(0)} ms`;
+  }
+  path(context, points) {
+    context.beginPath();
+    for (let i = 0; i < points.length; i += 2) context.lineTo(...this.xy(points[i], points[i + 1]));
+    context.closePath();
+  }
+}
+
 // Cine players of tracked slices: images with their lines in the colour of the standard error, phase by phase.
 const cineShown = { lines: true, rejected: true, outlines: true };
 const cinePlayers = (tracking) => {
@@ -13,17 +67,6 @@ const cinePlayers = (tracking) => {
   const shown = cineShown;
   const players = [];
 
-  const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-  const bitmap = (slice, image) => {
-    if (image.bitmap) return image.bitmap;
-    const grey = bytes(image.picture), data = new ImageData(slice.columns, slice.rows);
-    grey.forEach((value, i) => data.data.set([value, value, value, 255], 4 * i));
-    image.bitmap = document.createElement("canvas");
-    image.bitmap.width = slice.columns;
-    image.bitmap.height = slice.rows;
-    image.bitmap.getContext("2d").putImageData(data, 0, 0);
-    return image.bitmap;
-  };
   // Points of one tag in their order along it; a gap of more than a spacing and a half breaks the line.
   const lines = (slice, image) => {
     if (image.lines) return image.lines;
@@ -44,51 +87,19 @@ const cinePlayers = (tracking) => {
     return image.lines;
   };
 
-  class Player {
+  class TaggedPlayer extends CinePlayer {
     constructor(holder) {
-      this.holder = holder;
-      this.slice = tracking.slices[Number(holder.dataset.slice)];
-      this.canvas = holder.querySelector("canvas");
-      this.range = holder.querySelector(".cine-phase");
-      this.button = holder.querySelector(".cine-play");
-      this.scale = Math.max(2, Math.round(640 / this.slice.columns));
-      this.canvas.width = this.scale * this.slice.columns;
-      this.canvas.height = Math.round(this.scale * this.slice.rows * this.slice.pixel_mm[1] / this.slice.pixel_mm[0]);
-      this.overlays = [];
-      this.range.addEventListener("input", () => this.draw());
-      this.button.addEventListener("click", () => this.play(this.timer === undefined));
+      super(holder, tracking.slices[Number(holder.dataset.slice)]);
+      this.overlays.push((context) => this.drawTags(context));
       this.canvas.addEventListener("pointermove", (event) => this.showNearest(event));
-      this.draw();
       this.chart();
+      this.draw();
     }
-    get phase() { return Number(this.range.value); }
-    get image() { return this.slice.images[this.phase]; }
-    // Canvas coordinates of a place in pixels of the image, and back.
-    xy(column, row) { return [(column + 0.5) * this.canvas.width / this.slice.columns, (row + 0.5) * this.canvas.height / this.slice.rows]; }
-    place(event) {
-      const box = this.canvas.getBoundingClientRect();
-      return { column: (event.clientX - box.left) / box.width * this.slice.columns - 0.5, row: (event.clientY - box.top) / box.height * this.slice.rows - 0.5 };
-    }
-    play(on) {
-      clearInterval(this.timer);
-      this.timer = on ? setInterval(() => { this.range.value = (this.phase + 1) % this.slice.images.length; this.draw(); }, 120) : undefined;
-      this.button.textContent = on ? "\u25a0" : "\u25b6";
-    }
-    draw() {
-      const context = this.canvas.getContext("2d"), image = this.image;
-      context.imageSmoothingEnabled = false;
-      context.drawImage(bitmap(this.slice, image), 0, 0, this.canvas.width, this.canvas.height);
-      if (shown.outlines) this.drawOutlines(context, image);
-      if (shown.lines) this.drawLines(context, image);
-      if (shown.rejected) this.drawRejected(context, image);
-      for (const overlay of this.overlays) overlay(context);
-      this.holder.querySelector(".cine-time").textContent = `phase ${image.frame}, ${image.trigger_ms.toFixed(0)} ms`;
-      this.holder.querySelector(".cine-mark")?.setAttribute("x", this.chartX(this.phase) - 2);
-    }
-    path(context, points) {
-      context.beginPath();
-      for (let i = 0; i < points.length; i += 2) context.lineTo(...this.xy(points[i], points[i + 1]));
-      context.closePath();
+    drawTags(context) {
+      if (shown.outlines) this.drawOutlines(context, this.image);
+      if (shown.lines) this.drawLines(context, this.image);
+      if (shown.rejected) this.drawRejected(context, this.image);
+      this.holder.querySelector(".cine-mark").setAttribute("x", this.chartX(this.phase) - 2);
     }
     drawOutlines(context, image) {
       context.strokeStyle = "#ffffffb0";
@@ -154,7 +165,7 @@ const cinePlayers = (tracking) => {
     }
   }
 
-  for (const holder of document.querySelectorAll(".cine")) players.push(new Player(holder));
+  for (const holder of document.querySelectorAll(".cine")) players.push(new TaggedPlayer(holder));
   for (const name of ["lines", "rejected", "outlines"]) {
     const box = document.getElementById(`cine-${name}`);
     box.checked = shown[name];

@@ -1,46 +1,25 @@
-// The desk by its whole program: its door, and its page in a real browser. Screenshots go to the directory that DIASTOLE_SCREENSHOTS
-// names, if it does.
+// The desk of tagged images: its door, and its page in a real browser.
 
 #include <gmock/gmock.h>
 
 #include <csignal>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 
-#include "tests/flow/browser.hpp"
-#include "tests/flow/programs.hpp"
-#include "tests/flow/web_client.hpp"
+#include "tests/flow/desk_program.hpp"
 
 namespace diastole::flow {
 namespace {
 
 using nlohmann::json;
 using testing::HasSubstr;
-using Path = std::vector<std::array<double, 2>>;
 
-class Desk : public testing::Test {
+class Desk : public DeskProgram {
  protected:
   Desk() {
     std::filesystem::copy(std::filesystem::path(DIASTOLE_EXAMPLES) / "tagged-gel", place / "gel",
                           std::filesystem::copy_options::recursive);
-  }
-  void begin(std::vector<std::string> more = {}) {
-    std::vector<std::string> arguments = {"diastole", "desk", "gel/dicom", "--no-browser", "--json"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    desk = std::make_unique<Program>(place, arguments);
-    ASSERT_TRUE(desk->wait_for_text("edits")) << desk->err();
-    url = json::parse(desk->out())["url"];
-    port = std::stoi(url.substr(url.find(':', 7) + 1));
-    token = url.substr(url.find("token=") + 6);
-  }
-  WebAnswer post(const std::string& path, const std::string& body, const std::string& with_token) const {
-    WebClient client(port);
-    client.send("POST " + path + " HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) +
-                "\r\nAuthorization: Bearer " + with_token +
-                "\r\nContent-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body);
-    return client.read_answer();
   }
   /// The lines of the edits file.
   std::vector<json> choices() const {
@@ -50,18 +29,13 @@ class Desk : public testing::Test {
       lines.push_back(json::parse(line));
     return lines;
   }
-
-  Workplace place;
-  std::unique_ptr<Program> desk;
-  std::string url, token;
-  int port = 0;
 };
 
 const std::string mask =
     R"({"slice": "series 2, slice 1", "phase": 2, "action": "mask", "points": [[60, 40], [80, 40], [80, 60]]})";
 
 TEST_F(Desk, LetsInOnlyThisMachineWithItsTokenAndWritesNothingElse) {
-  begin();
+  begin("gel/dicom");
   EXPECT_EQ(WebClient(port).get("/").status, 200);
   EXPECT_EQ(WebClient(port).get("/state").status, 401);
   EXPECT_EQ(WebClient(port).get("/state", {"Authorization: Bearer " + token}).status, 200);
@@ -110,33 +84,12 @@ class DeskInABrowser : public Desk {
   void SetUp() override {
     if (Browser::program().empty())
       GTEST_SKIP() << "this machine has no Chromium: apt install chromium-headless-shell";
-    begin({"-o", "gel.tags.csv"});
-    browser = std::make_unique<Browser>(place, 1280, 1100);
-    browser->open(url);
-    browser->wait_until("desk.players.length === 4");
-  }
-  void click(const std::string& selector) {
-    browser->value("document.querySelector('" + selector + "').click()");
-  }
-  /// Places of a picture in the window.
-  Path in_window(int player, const Path& places_px) {
-    browser->value("desk.players[" + std::to_string(player) + "].canvas.scrollIntoView({block: 'center'})");
-    const json box = browser->value("(b => [b.left, b.top, b.width, b.height])(desk.players[" +
-                                    std::to_string(player) + "].canvas.getBoundingClientRect())");
-    Path path;
-    for (const auto& [column, row] : places_px)
-      path.push_back({box[0].get<double>() + (column + 0.5) / 96 * box[2].get<double>(),
-                      box[1].get<double>() + (row + 0.5) / 96 * box[3].get<double>()});
-    return path;
+    begin("gel/dicom", {"-o", "gel.tags.csv"});
+    open_page(1280, 1100, 4);
   }
   void wait_for_choices(size_t count) {
     browser->wait_until("desk.edits.length === " + std::to_string(count));
   }
-  void screenshot(const std::string& name) {
-    if (const char* directory = std::getenv("DIASTOLE_SCREENSHOTS"))
-      browser->screenshot(std::string(directory) + "/" + name);
-  }
-  std::unique_ptr<Browser> browser;
 };
 
 TEST_F(DeskInABrowser, WhatIsDrawnIsInTheFileAtOnceAndTrackedAgain) {
@@ -211,14 +164,7 @@ TEST_F(DeskInABrowser, WhatIsDrawnIsInTheFileAtOnceAndTrackedAgain) {
   };
   EXPECT_EQ(text("gel.tags.csv"), text("again.tags.csv")) << "the desk tracks as `track` does";
 
-  EXPECT_THAT(browser->complaints(), testing::IsEmpty());
-  const std::string base = url.substr(0, url.find('#'));
-  for (const std::string& asked : browser->requested_urls())
-    EXPECT_THAT(asked, testing::StartsWith(base));
-  browser->resize(390, 800);
-  EXPECT_EQ(browser->value("document.documentElement.scrollWidth <= 390"), true) << "wider than a telephone";
-  ::kill(desk->pid(), SIGTERM);
-  browser->wait_until("document.getElementById('problem').textContent.includes('stands in the file')");
+  expect_a_good_page();
 }
 
 }  // namespace

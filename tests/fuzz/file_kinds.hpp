@@ -25,6 +25,9 @@ enum class FileKind : unsigned char {
   update,
   key,
   elf,
+  guide,       ///< a table, or a GPFile
+  bench_test,  ///< of tissue
+  nifti,       ///< image, form feed, bval, form feed, bvec
   count
 };
 

@@ -14,12 +14,15 @@
 #include "estimator/grids/gmsh_file.hpp"
 #include "estimator/grids/vtu_file.hpp"
 #include "estimator/grids/xdmf_file.hpp"
+#include "estimator/imaging/diffusion/nifti_series.hpp"
+#include "estimator/imaging/geometry/guide_points.hpp"
 #include "estimator/io/fibre_points.hpp"
 #include "estimator/io/fit_file.hpp"
 #include "estimator/io/flow_file.hpp"
 #include "estimator/io/measurement.hpp"
 #include "estimator/io/study.hpp"
 #include "estimator/io/tracking_file.hpp"
+#include "estimator/law_fit/bench_test.hpp"
 #include "estimator/materials/file_law.hpp"
 #include "estimator/mesh/exfile_import.hpp"
 #include "estimator/mesh/mesh_file.hpp"
@@ -104,6 +107,17 @@ void read(fuzz::FileKind kind, std::string_view text) {
     }
     case elf:
       return (void)ElfSymbols(as_file(text, "a.elf")).name_at(0x0802'0000);
+    case guide:
+      return (void)imaging::guide_points_from_text(text, "guide");
+    case bench_test:
+      return (void)read_bench_test(as_file(text, "a.csv"));
+    case nifti: {
+      const size_t last = text.rfind('\f'), middle = last == 0 ? text.npos : text.rfind('\f', last - 1);
+      if (last == text.npos || middle == text.npos) return;
+      return (void)imaging::read_nifti({as_file(text.substr(0, middle), "a.nii"),
+                                        as_file(text.substr(middle + 1, last - middle - 1), "a.bval"),
+                                        as_file(text.substr(last + 1), "a.bvec")});
+    }
     case count:
       return;
   }

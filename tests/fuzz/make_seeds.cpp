@@ -2,6 +2,7 @@
 //   make_seeds DIRECTORY     (makes a folder for each target in it)
 
 #include <algorithm>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -200,6 +201,29 @@ void write_file(const std::filesystem::path& directory, fuzz::FileKind kind, std
   write(directory / "fuzz_files" / std::to_string(++number), bytes);
 }
 
+/// An image of 2 x 2 x 2 voxels in three volumes (nifti1.h), and its tables.
+std::string nifti_seed() {
+  std::string header(352, '\0');
+  const auto put = [&](size_t at, auto value) { std::memcpy(header.data() + at, &value, sizeof(value)); };
+  put(0, std::int32_t{348});
+  size_t at = 40;
+  for (const std::int16_t size : {4, 2, 2, 2, 3, 1, 1, 1}) {
+    put(at, size);
+    at += sizeof(size);
+  }
+  put(70, std::int16_t{16});  // floats
+  put(72, std::int16_t{32});
+  for (at = 76; at < 108; at += 4)
+    put(at, 2.0F);
+  put(108, 352.0F);
+  put(112, 1.0F);
+  put(254, std::int16_t{1});  // of the three rows that follow
+  for (const size_t row : {0, 1, 2})
+    put(280 + 20 * row, 2.0F);
+  header.replace(344, 3, "n+1");
+  return header + std::string(4 * 2 * 2 * 2 * 3, 'A') + "\f0 1000 1000\n\f0 1 0\n0 0 1\n0 0 0\n";
+}
+
 /// The examples, documents of records with one of everything, and grids of one cell.
 void write_files(const std::filesystem::path& directory) {
   using enum fuzz::FileKind;
@@ -223,6 +247,8 @@ void write_files(const std::filesystem::path& directory) {
       {effect, "effects/viscoelasticity.effect.toml"},
       {law, "laws/guccione.law.toml"},
       {law, "laws/holzapfel-ogden.law.toml"},
+      {guide, "ventricle.guide.csv"},
+      {bench_test, "shear-test.csv"},
   };
   for (const auto& [kind, name] : examples)
     write_file(directory, kind,
@@ -283,6 +309,8 @@ Element: 1 0 0
  Nodes:
  1 1 1 1 1 1 1 1
 )");
+  write_file(directory, guide, "x y z contour-type sliceID weight frame\n1 2 3 SAX_LV_ENDOCARDIAL 3 1 0\n");
+  write_file(directory, nifti, nifti_seed());
   const Bytes image = flash_test::make_update_file({});
   write_file(directory, update, {reinterpret_cast<const char*>(image.data()), image.size()});
   const std::filesystem::path key_file = directory / "seed-key.pem";

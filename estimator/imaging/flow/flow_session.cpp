@@ -7,7 +7,7 @@
 #include <limits>
 #include <numbers>
 
-#include "estimator/io/tracking_file.hpp"
+#include "estimator/imaging/series/grey_picture.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/flow_writer.hpp"
 #include "protocol/runfile/reader.hpp"
@@ -19,16 +19,6 @@ constexpr int curve_points = 240;
 constexpr int outline_points = 72;
 /// Around the lumen, so that wall and still material are seen.
 constexpr int cut_margin_px = 8;
-
-template <class Value>
-std::string picture_of(Eigen::Index rows, Eigen::Index columns, const Value& share_at) {
-  std::string bytes;
-  for (Eigen::Index row = 0; row < rows; ++row)
-    for (Eigen::Index column = 0; column < columns; ++column)
-      bytes += static_cast<char>(
-          static_cast<unsigned char>(std::lround(255 * std::clamp(share_at(row, column), 0.0, 1.0))));
-  return base64(bytes);
-}
 
 /// The window of the images and each phase's outline in it.
 void add_images(FlowRecord& record, const FlowMeasurement& flow) {
@@ -51,16 +41,12 @@ void add_images(FlowRecord& record, const FlowMeasurement& flow) {
   for (size_t k = 0; k < flow.scan.phases(); ++k) {
     FlowImageRecord image;
     image.phase_s = flow.scan.time_s[k];
-    const auto at = [&, r = first_row, c = first_column](const Image& of, Eigen::Index row,
-                                                         Eigen::Index column) {
-      return static_cast<double>(of(r + row, c + column));
+    const auto window_of = [&, r = first_row, c = first_column, h = rows, w = columns](const Image& whole) {
+      return whole.block(r, c, h, w);
     };
-    image.magnitude = picture_of(rows, columns, [&](Eigen::Index row, Eigen::Index column) {
-      return at(flow.scan.magnitude[k], row, column) / static_cast<double>(white);
-    });
-    image.velocity = picture_of(rows, columns, [&](Eigen::Index row, Eigen::Index column) {
-      return 0.5 + 0.5 * at(flow.scan.phase_rad[k], row, column) / std::numbers::pi;
-    });
+    image.magnitude = grey_picture(window_of(flow.scan.magnitude[k]), white);
+    image.velocity =
+        grey_picture(0.5F + window_of(flow.scan.phase_rad[k]) / (2 * std::numbers::pi_v<float>), 1.0F);
     const LumenShape& here = flow.lumen.shapes[k];
     for (int i = 0; i < outline_points; ++i) {
       const double angle = 2 * std::numbers::pi * i / outline_points;

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "estimator/imaging/series/image_series.hpp"
@@ -27,6 +28,9 @@ struct ImageFolder {
 /// All files in a folder and in those within it, in order of their paths. Throws InputError if there is no such folder, or one of
 /// them cannot be read.
 std::vector<std::filesystem::path> files_below(const std::filesystem::path& folder);
+
+/// FOLDER with this ending, beside the folder: where what a person says about it stands unless another file is named.
+std::filesystem::path beside(const std::filesystem::path& folder, std::string_view ending);
 
 using Progress = std::function<void(size_t done, size_t all)>;
 

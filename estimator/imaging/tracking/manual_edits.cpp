@@ -8,6 +8,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "estimator/imaging/series/image_folder.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/json_text.hpp"
 #include "protocol/contract/table_reader.hpp"
@@ -314,9 +315,7 @@ class Application {
 }  // namespace
 
 std::filesystem::path edits_beside(const std::filesystem::path& folder) {
-  std::filesystem::path whole = std::filesystem::absolute(folder).lexically_normal();
-  if (!whole.has_filename()) whole = whole.parent_path();
-  return whole.parent_path() / (whole.filename().string() + ".edits.jsonl");
+  return beside(folder, ".edits.jsonl");
 }
 
 ManualEdits parse_edits(std::string_view text, const std::filesystem::path& file) {

@@ -4,34 +4,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "estimator/imaging/series/grey_picture.hpp"
 #include "estimator/imaging/tracking/outline.hpp"
 
 namespace diastole::imaging {
 namespace {
-
-/// White is brighter than all but one in two hundred pixels of the slice's images.
-constexpr double white_share = 0.995;
-
-float white_of(const TagView& view) {
-  std::vector<float> values;
-  for (const Image& image : view.images)
-    values.insert(values.end(), image.data(), image.data() + image.size());
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(white_share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return std::max(*at, 1e-6F);
-}
-
-std::string picture_of(const Image& image, float white) {
-  std::string bytes;
-  bytes.reserve(static_cast<size_t>(image.size()));
-  for (Eigen::Index row = 0; row < image.rows(); ++row) {
-    for (Eigen::Index column = 0; column < image.cols(); ++column)
-      bytes += static_cast<char>(
-          static_cast<unsigned char>(std::lround(255 * std::clamp(image(row, column) / white, 0.0F, 1.0F))));
-  }
-  return base64(bytes);
-}
 
 TrackedSliceImages slice_record(const TrackedSlice& slice, const std::vector<DroppedCount>& dropped) {
   const SlicePlane& plane = slice.view.plane;
@@ -44,7 +21,7 @@ TrackedSliceImages slice_record(const TrackedSlice& slice, const std::vector<Dro
   for (const TagWave& wave : slice.tracked.waves)
     record.directions.push_back(
         {std::atan2(wave.per_mm.y(), wave.per_mm.x()) * 180 / std::numbers::pi, wave.spacing_mm()});
-  const float white = white_of(slice.view);
+  const float white = white_of(slice.view.images);
   const std::vector<PhaseSummary> summaries = phase_summaries(slice);
   for (size_t k = 0; k < slice.view.images.size(); ++k) {
     TrackedImage image;
@@ -52,7 +29,7 @@ TrackedSliceImages slice_record(const TrackedSlice& slice, const std::vector<Dro
     image.trigger_ms = slice.view.times_ms[k];
     image.sigma_px = summaries[k].sigma_px;
     image.residual = 100 * summaries[k].residual / static_cast<double>(white);
-    image.picture = picture_of(slice.view.images[k], white);
+    image.picture = grey_picture(slice.view.images[k], white);
     for (const TagPoint& point : slice.points.points) {
       if (point.frame != image.frame) continue;
       const Eigen::Vector3d from_mm = point.x_mm - plane.origin_mm;

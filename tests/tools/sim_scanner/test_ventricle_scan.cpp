@@ -8,45 +8,23 @@
 #include "estimator/imaging/diffusion/tensor_fit.hpp"
 #include "estimator/imaging/geometry/cine_points.hpp"
 #include "estimator/imaging/series/image_folder.hpp"
-#include "estimator/mesh/ellipsoid.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
+#include "tests/tools/sim_scanner/scanned_ventricle.hpp"
 #include "tools/sim_scanner/diffusion_scan.hpp"
-#include "tools/sim_scanner/scanner.hpp"
 
 namespace diastole::scanner {
 namespace {
 
 class VentricleScan : public testing::Test {
  protected:
-  VentricleScan() : mesh_(make_ellipsoid(shape_)) {
-    protocol_.short_axis_mm = {-36, -24, -12, 0};
-    protocol_.long_axis_deg = {0, 60, 120};
-    protocol_.middle_mm = -22.5;
-    protocol_.field_of_view_mm = 100;
-    protocol_.matrix = 100;
-    protocol_.tagged = false;
-    protocol_.cine = protocol_.dark_bath = true;
-  }
   void scan_phases(int phases, double step_s = 0.1) const {
-    MovingBody body{&mesh_, {}, {}, 1.0};
-    for (int k = 0; k < phases; ++k) {
-      body.times_s.push_back(0.01 + step_s * k);
-      // It widens by 3 % from phase to phase: without motion an export is none.
-      NodeField position_mm = mesh_.reference();
-      for (size_t node = 0; node < mesh_.node_count(); ++node)
-        for (size_t derivative = 0; derivative < 8; ++derivative)
-          for (size_t axis = 0; axis < 2; ++axis)
-            position_mm[dof_of(node, derivative, axis)] *= 1 + 0.03 * k;
-      body.position_mm.push_back(position_mm);
-    }
-    const std::filesystem::path folder = scratch_.path() / std::to_string(phases);
-    std::filesystem::create_directory(folder);
-    (void)scan(body, protocol_, {}, folder, {});
+    ventricle_.scan_phases(phases, scratch_.path() / std::to_string(phases), step_s);
   }
 
-  EllipsoidShape shape_;
-  HermiteMesh mesh_;
-  ScanProtocol protocol_;
+  ScannedVentricle ventricle_;
+  const EllipsoidShape& shape_ = ventricle_.shape;
+  HermiteMesh& mesh_ = ventricle_.mesh;
+  ScanProtocol& protocol_ = ventricle_.protocol;
   test::ScratchFolder scratch_;
 };
 
@@ -57,7 +35,7 @@ TEST_F(VentricleScan, WallsAndBaseAreFoundInItsCines) {
   protocol_.long_axis_deg = {};
   protocol_.seed = 0;
   scan_phases(3, 0.13);
-  const imaging::GuidePoints guide = imaging::cine_guide_points(scratch_.path());
+  const imaging::GuidePoints guide = imaging::cine_guide_points(imaging::read_cines(scratch_.path()));
   ASSERT_EQ(guide.phases.size(), 4U);
   int walls = 0, base = 0;
   for (const imaging::GuidePoint& point : guide.points) {
@@ -93,7 +71,8 @@ std::vector<double> inner_radius_mm(const imaging::GuidePoints& guide) {
 
 TEST_F(VentricleScan, AMissingImageMovesNoOtherToItsPhase) {
   scan_phases(6);
-  const std::vector<double> whole = inner_radius_mm(imaging::cine_guide_points(scratch_.path()));
+  const std::vector<double> whole =
+      inner_radius_mm(imaging::cine_guide_points(imaging::read_cines(scratch_.path())));
   // Of one half of the slices the third image is lost, of the other the fifth: all have five.
   const imaging::ImageFolder folder = imaging::read_image_folder(scratch_.path());
   size_t count = 0;
@@ -101,7 +80,7 @@ TEST_F(VentricleScan, AMissingImageMovesNoOtherToItsPhase) {
     for (const imaging::SliceImages& slice : series.slices)
       std::filesystem::remove(folder.files[folder.images[slice.images[count++ % 2 == 0 ? 2 : 4]].file]);
   ASSERT_EQ(count, 7U);
-  const imaging::GuidePoints guide = imaging::cine_guide_points(scratch_.path());
+  const imaging::GuidePoints guide = imaging::cine_guide_points(imaging::read_cines(scratch_.path()));
   ASSERT_EQ(guide.phases.size(), 6U);
   const std::vector<double> found = inner_radius_mm(guide);
   int compared = 0;

@@ -4,24 +4,28 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "estimator/imaging/series/image_folder.hpp"
 #include "estimator/imaging/tracking/tags_file.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/json_text.hpp"
 #include "tools/diastole/commands.hpp"
 #include "tools/diastole/desk/desk_server.hpp"
+#include "tools/diastole/desk/guide_desk.hpp"
+#include "tools/diastole/desk/tag_desk.hpp"
 
 namespace diastole {
 namespace {
 
 struct DeskArguments {
   imaging::TrackRequest request;
-  std::optional<std::filesystem::path> tags;
+  std::optional<std::filesystem::path> tags, guide;
   uint16_t port = 0;
   bool no_browser = false;
   bool force = false;
@@ -41,19 +45,16 @@ void open_browser(const std::string& url) {
   posix_spawn_file_actions_destroy(&quiet);
 }
 
-ExitCode run_desk(const DeskArguments& arguments, const CommandOutput& out) {
-  if (arguments.tags) {
-    std::vector<std::filesystem::path> inputs = {imaging::edits_file(arguments.request)};
-    if (arguments.request.pose) inputs.push_back(*arguments.request.pose);
-    require_output({*arguments.tags, inputs, imaging::tags_file_mark, arguments.force});
-  }
-  desk::DeskSession session(arguments.request, arguments.tags);
-  desk::DeskServer server(session, arguments.port);
-  const std::string url = server.url(), file = session.edits_file().string();
+/// Serves until Ctrl-C. `file`: what is written at each choice, under `name` in JSON.
+ExitCode serve(desk::DeskPages& pages, const DeskArguments& arguments, const std::string& name,
+               const std::filesystem::path& file, const CommandOutput& out) {
+  desk::DeskServer server(pages, arguments.port);
+  const std::string url = server.url();
   if (out.json) {
-    std::cout << json_text(nlohmann::json{{"url", url}, {"edits", file}}) << std::endl;
+    std::cout << json_text(nlohmann::json{{"url", url}, {name, file.string()}}) << std::endl;
   } else {
-    fmt::print("The desk: {}\nChoices go to {}\nCtrl-C ends it; nothing is lost.\n", url, file);
+    fmt::print("The desk: {}\nWhat is done there goes to {}\nCtrl-C ends it; nothing is lost.\n", url,
+               file.string());
     std::fflush(stdout);
   }
   if (!arguments.no_browser) open_browser(url);
@@ -61,29 +62,69 @@ ExitCode run_desk(const DeskArguments& arguments, const CommandOutput& out) {
   return ExitCode::done;
 }
 
+/// Tags, or the walls of cines: what the folder has, or what is asked for.
+bool is_for_guide_points(const DeskArguments& arguments) {
+  if (arguments.guide) return true;
+  const imaging::ImageFolder folder = imaging::read_image_folder(arguments.request.folder);
+  const auto has = [&](imaging::SeriesKind kind) {
+    return std::ranges::any_of(folder.series, [&](const auto& series) { return series.kind == kind; });
+  };
+  return has(imaging::SeriesKind::cine) && !has(imaging::SeriesKind::tagged_cine);
+}
+
+ExitCode run_desk(const DeskArguments& arguments, const CommandOutput& out) {
+  const std::filesystem::path& folder = arguments.request.folder;
+  if (is_for_guide_points(arguments)) {
+    const std::filesystem::path guide = arguments.guide.value_or(imaging::beside(folder, ".guide.csv"));
+    if (!std::filesystem::exists(guide)) require_output({guide, {}, "", false});
+    desk::GuideDesk pages(folder, guide);
+    return serve(pages, arguments, "guide", guide, out);
+  }
+  if (arguments.tags) {
+    std::vector<std::filesystem::path> inputs = {imaging::edits_file(arguments.request)};
+    if (arguments.request.pose) inputs.push_back(*arguments.request.pose);
+    require_output({*arguments.tags, inputs, imaging::tags_file_mark, arguments.force});
+  }
+  desk::TagDesk pages(arguments.request, arguments.tags);
+  return serve(pages, arguments, "edits", pages.edits_file(), out);
+}
+
 }  // namespace
 
 void add_desk(CommandLine& line) {
   auto arguments = std::make_shared<DeskArguments>();
   CLI::App* command = line.add(
-      "desk", "look at and correct tracking and contours in a browser",
+      "desk", "look at and correct tracking, contours and guide points in a browser",
       "  diastole desk dicom/\n"
       "  diastole desk dicom/ -o gel.tags.csv\n"
       "  diastole desk dicom/ --port 8610 --no-browser     # over ssh -L 8610:127.0.0.1:8610\n"
-      "Drag lines, mask regions, draw the wall's contours, undo, track again. Each choice is a line of "
-      "FOLDER.edits.jsonl at once,\n"
-      "which `diastole track` and `fit` replay: nothing is done here that a file could not say. Only this "
-      "machine "
-      "is answered, and\n"
-      "only with the address that is printed. docs/imaging.md says more.");
+      "  diastole desk cines/ --guide heart.guide.csv\n"
+      "Tagged images: drag lines, mask regions, draw the wall's contours, undo, track again. Each choice is "
+      "a "
+      "line of FOLDER.edits.jsonl\n"
+      "at once, which `diastole track` and `fit` replay. Cines: set, move and remove guide points on a "
+      "ventricle's walls, and see the\n"
+      "ventricle that is fitted to them; they are in FOLDER.guide.csv at once, which `diastole lv` takes. "
+      "Nothing is done here that a\n"
+      "file could not say. Only this machine is answered, and only with the address that is printed. "
+      "docs/imaging.md and docs/lv.md\n"
+      "say more.");
   DeskArguments& a = *arguments;
   command->add_option("FOLDER", a.request.folder, "the folder with the scanner's files")->required();
-  command->add_option("--edits", a.request.edits,
-                      "the file of choices [FOLDER.edits.jsonl beside the folder]");
-  command->add_option("-o,--output", a.tags, "the tag points, written after each tracking (*.tags.csv)");
-  command->add_option("--pose", a.request.pose,
-                      "where the specimen's frame lies in patient coordinates (*.pose.toml)");
-  command->add_option("--coords", a.request.coordinates, "coordinates of the points")
+  auto* guide = command->add_option("--guide", a.guide,
+                                    "guide points on cines, which are found where there is no such file "
+                                    "[FOLDER.guide.csv beside a folder that has cines and no tags]");
+  command
+      ->add_option("--edits", a.request.edits,
+                   "the file of choices about tags [FOLDER.edits.jsonl beside the folder]")
+      ->excludes(guide);
+  command->add_option("-o,--output", a.tags, "the tag points, written after each tracking (*.tags.csv)")
+      ->excludes(guide);
+  command
+      ->add_option("--pose", a.request.pose,
+                   "where the specimen's frame lies in patient coordinates (*.pose.toml)")
+      ->excludes(guide);
+  command->add_option("--coords", a.request.coordinates, "coordinates of the tag points")
       ->check(CLI::IsMember({"auto", "specimen", "patient"}))
       ->capture_default_str();
   command->add_option("--port", a.port, "of 127.0.0.1 [any free one]")->check(CLI::Range(0, 65535));

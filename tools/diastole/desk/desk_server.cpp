@@ -15,7 +15,6 @@
 #include "host/web/door.hpp"
 #include "host/web/request.hpp"
 #include "protocol/contract/input_error.hpp"
-#include "protocol/contract/json_text.hpp"
 #include "tools/diastole/desk/embedded.hpp"
 
 namespace diastole::desk {
@@ -26,7 +25,6 @@ namespace beast = boost::beast;
 namespace http = beast::http;
 using asio::ip::tcp;
 using beast::error_code;
-using nlohmann::json;
 
 constexpr std::chrono::seconds patience{10};
 constexpr uint64_t most_body_bytes = 1 << 20;  // a choice of some ten thousand points
@@ -39,32 +37,25 @@ std::string_view view(beast::string_view field) { return {field.data(), field.si
 
 struct Answer {
   int status = 200;
-  std::string type = "application/json";
-  std::string body = {};
+  std::string_view type = "application/json";
+  std::shared_ptr<const std::string> body = {};
 };
 
-Answer refused(int status, const std::string& sentence) {
-  return {status, "text/plain; charset=utf-8", sentence + "\n"};
-}
+Answer as_text(const DeskAnswer& answer) { return {answer.status, "text/plain; charset=utf-8", answer.body}; }
 
-const report::PageAsset* find_asset(std::string_view path) {
-  static const std::array own{
-      report::PageAsset{"/", "text/html; charset=utf-8", embedded::desk_html},
-      report::PageAsset{"/desk.js", "text/javascript", embedded::desk_js},
+/// What every desk's page has beside its own.
+std::span<const report::PageAsset> shared_assets() {
+  static const std::array assets{
+      report::PageAsset{"/door.js", "text/javascript", embedded::door_js},
       report::PageAsset{"/desk.css", "text/css", embedded::desk_css},
       report::PageAsset{"/icon.svg", "image/svg+xml", web::find_page_file("/icon.svg")->text}};
-  for (const std::span<const report::PageAsset> assets :
-       {std::span<const report::PageAsset>(own), report::cine_assets()}) {
-    const auto found = std::ranges::find(assets, path, &report::PageAsset::path);
-    if (found != assets.end()) return &*found;
-  }
-  return nullptr;
+  return assets;
 }
 
 /// What becomes of requests.
 class Desk {
  public:
-  Desk(DeskSession& session, web::Door door) : session_(session), door_(std::move(door)) {}
+  Desk(DeskPages& pages, web::Door door) : pages_(pages), door_(std::move(door)) {}
 
   [[nodiscard]] const web::Door& door() const { return door_; }
 
@@ -73,44 +64,38 @@ class Desk {
     if (const auto refusal =
             door_.check_place(view(request[http::field::host]),
                               origin == request.end() ? std::nullopt : std::optional(view(origin->value()))))
-      return refused(refusal->status, refusal->sentence);
+      return as_text(refused(refusal->status, refusal->sentence));
     const std::string_view all = view(request.target());
     const std::string_view path = all.substr(0, all.find('?'));
     const bool is_get = request.method() == http::verb::get;
     if (const report::PageAsset* asset = is_get ? find_asset(path) : nullptr)
-      return {200, std::string(asset->type), std::string(asset->text)};
+      return {200, asset->type, std::make_shared<const std::string>(asset->text)};
     if (door_.role_of(web::token_in(view(request[http::field::authorization]), {})) != ConsoleRole::control)
-      return refused(
-          401, "The token in this address is not valid: open the address that `diastole desk` printed.");
-    if (is_get && path == "/tracking") {
-      const auto tracking = session_.tracking();
-      return tracking ? Answer{200, "application/json", *tracking}
-                      : refused(503, "The first tracking is at work.");
+      return as_text(refused(
+          401, "The token in this address is not valid: open the address that `diastole desk` printed."));
+    std::optional<DeskAnswer> answer;
+    try {
+      if (is_get) answer = pages_.get(path);
+      if (request.method() == http::verb::post) answer = pages_.post(path, request.body());
+    } catch (const InputError& error) {
+      return as_text(refused(422, error.what()));
     }
-    if (is_get && path == "/state") return state();
-    if (request.method() == http::verb::post && path == "/track") {
-      session_.track();
-      return state();
-    }
-    if (request.method() == http::verb::post && path == "/edits") {
-      try {
-        session_.append(request.body());
-      } catch (const InputError& error) {
-        return refused(422, error.what());
-      }
-      return state();
-    }
-    return refused(404, "There is no such thing here. The desk is at /.");
+    if (!answer) return as_text(refused(404, "There is no such thing here. The desk is at /."));
+    if (answer->status != 200) return as_text(*answer);
+    return {200, "application/json", answer->body};
   }
 
  private:
-  [[nodiscard]] Answer state() const {
-    json state = session_.state();
-    state["edits"] = session_.edits();
-    return {200, "application/json", json_text(state)};
+  [[nodiscard]] const report::PageAsset* find_asset(std::string_view path) const {
+    for (const std::span<const report::PageAsset> assets :
+         {pages_.assets(), shared_assets(), report::cine_assets()}) {
+      const auto found = std::ranges::find(assets, path, &report::PageAsset::path);
+      if (found != assets.end()) return &*found;
+    }
+    return nullptr;
   }
 
-  DeskSession& session_;
+  DeskPages& pages_;
   web::Door door_;
 };
 
@@ -135,12 +120,12 @@ class Connection : public std::enable_shared_from_this<Connection> {
   }
 
  private:
-  void reply(Answer answer) {
+  void reply(const Answer& answer) {
     response_ = Response(static_cast<http::status>(answer.status), 11);
-    response_.set(http::field::content_type, answer.type);
+    response_.set(http::field::content_type, {answer.type.data(), answer.type.size()});
     web::set_page_headers(response_);
     response_.keep_alive(parser_->get().keep_alive());
-    response_.body() = std::move(answer.body);
+    response_.body() = *answer.body;
     response_.prepare_payload();
     stream_.tcp().expires_after(patience);
     http::async_write(stream_, response_, [self = shared_from_this()](error_code error, size_t) {
@@ -159,8 +144,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
 }  // namespace
 
 struct DeskServer::Impl {
-  Impl(DeskSession& session, uint16_t port)
-      : desk(session, web::Door({asio::ip::address_v4::loopback(), port}, "")), acceptor(context) {
+  Impl(DeskPages& pages, uint16_t port)
+      : desk(pages, web::Door({asio::ip::address_v4::loopback(), port}, "")), acceptor(context) {
     const tcp::endpoint endpoint(asio::ip::address_v4::loopback(), port);
     try {
       acceptor.open(endpoint.protocol());
@@ -189,7 +174,7 @@ struct DeskServer::Impl {
   tcp::acceptor acceptor;
 };
 
-DeskServer::DeskServer(DeskSession& session, uint16_t port) : impl_(std::make_unique<Impl>(session, port)) {}
+DeskServer::DeskServer(DeskPages& pages, uint16_t port) : impl_(std::make_unique<Impl>(pages, port)) {}
 DeskServer::~DeskServer() = default;
 
 std::string DeskServer::url() const {

@@ -1,12 +1,8 @@
 #pragma once
 // The desk's door: HTTP on this machine's loopback, for one person's browser.
 //
-//   GET /, /desk.js, ...     the page; anybody on this machine may have it, it holds nothing
-//   with the token ("Authorization: Bearer TOKEN"):
-//   GET /tracking            {"html", "record"}: what was tracked; 503 before there is anything
-//   GET /state               DeskSession::state(), and "edits"
-//   POST /edits              one choice; answers as /state does; 422 with a sentence if it does not fit
-//   POST /track              tracks again; answers as /state does
+//   GET /, /door.js, ...     the page; anybody on this machine may have it, it holds nothing
+//   with the token ("Authorization: Bearer TOKEN"): what the desk's pages answer (DeskPages); 422 with a sentence for what does not fit
 //
 // Host and Origin are checked first, as at the console (host/web/door.hpp).
 
@@ -14,14 +10,14 @@
 #include <memory>
 #include <string>
 
-#include "tools/diastole/desk/desk_session.hpp"
+#include "tools/diastole/desk/desk_pages.hpp"
 
 namespace diastole::desk {
 
 class DeskServer {
  public:
   /// Listens at 127.0.0.1; port 0: any free one. Throws HardwareError if it cannot.
-  DeskServer(DeskSession& session, uint16_t port);
+  DeskServer(DeskPages& pages, uint16_t port);
   ~DeskServer();
 
   [[nodiscard]] std::string url() const;  ///< with the token

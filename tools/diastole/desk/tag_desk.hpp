@@ -1,6 +1,11 @@
 #pragma once
-// What the desk knows: a folder's slices, the choices about them, and what was tracked with them. Tracking runs on a thread of its own;
+// The desk of tagged images: a folder's slices, the choices about them, and what was tracked with them. Tracking runs on a thread of its own;
 // all else is called from the server's.
+//
+//   GET /tracking            {"html", "record"}: what was tracked; 503 before there is anything
+//   GET /state               {"tracking", "done", "of", "version", "problem", "changed", "edits"}
+//   POST /edits              one choice; answers as /state does
+//   POST /track              tracks again; answers as /state does
 
 #include <filesystem>
 #include <map>
@@ -14,20 +19,26 @@
 #include <vector>
 
 #include "estimator/imaging/tracking/tracked_folder.hpp"
+#include "tools/diastole/desk/desk_pages.hpp"
 
 namespace diastole::desk {
 
-class DeskSession {
+class TagDesk final : public DeskPages {
  public:
   /// Reads folder and choices, and begins to track. `tags`: where the points go after each tracking. Throws InputError for a folder that
   /// is not sound or without tags, and for choices that do not fit it.
-  DeskSession(imaging::TrackRequest request, std::optional<std::filesystem::path> tags);
+  TagDesk(imaging::TrackRequest request, std::optional<std::filesystem::path> tags);
   /// Waits for the slices that are being tracked; the others are given up.
-  ~DeskSession();
-  DeskSession(const DeskSession&) = delete;
-  DeskSession& operator=(const DeskSession&) = delete;
+  ~TagDesk() override;
+
+  [[nodiscard]] std::span<const report::PageAsset> assets() const override;
+  std::optional<DeskAnswer> get(std::string_view path) override;
+  std::optional<DeskAnswer> post(std::string_view path, const std::string& body) override;
 
   [[nodiscard]] std::filesystem::path edits_file() const { return imaging::edits_file(request_); }
+
+ private:
+  using Choices = std::map<std::string, std::string>;  // of a slice, by its name
 
   /// Appends a choice (a JSON object, an undo included) to the file, and returns when the disk has it. Throws InputError, and leaves
   /// the file as it is, if it does not fit.
@@ -37,13 +48,10 @@ class DeskSession {
 
   /// Tracks the slices whose choices have changed; does nothing while it is at work.
   void track();
-  /// {"tracking", "done", "of", "version", "problem", "changed"}: changed slices are tracked with other choices than those that stand.
+  /// "changed": slices that were tracked with other choices than those that stand.
   [[nodiscard]] nlohmann::json state() const;
   /// {"html", "record"} of estimator/report/cine.hpp as JSON, or nothing before the first tracking has ended.
   [[nodiscard]] std::shared_ptr<const std::string> tracking() const;
-
- private:
-  using Choices = std::map<std::string, std::string>;  // of a slice, by its name
 
   [[nodiscard]] std::string file_text() const;
   [[nodiscard]] Choices choices() const;

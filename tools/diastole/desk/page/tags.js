@@ -1,7 +1,7 @@
 // The desk: tracked slices with handles. What is drawn becomes a choice (one line of the edits file) on the server, which answers with
 // all choices that stand; what is shown is theirs.
 const desk = (() => {
-  const byId = (id) => document.getElementById(id);
+  const { byId, ask, complain, endedWords, sizeButton, clamp, toolBar } = deskDoor;
   const hints = {
     look: "Point at a line for its tag and its error, at a cross for why it was left out. Double-click makes a picture large.",
     line: "Pull a line to where this tag is seen; its neighbourhood comes along, with Shift the whole line. Then track again.",
@@ -9,24 +9,7 @@ const desk = (() => {
     outer: "Pull the dashed or drawn outer edge, or draw a new one around the wall.",
     inner: "Pull the dashed or drawn inner edge, or draw a new one around the cavity.",
   };
-  // The token comes behind # and is taken out of sight; it stays with this tab.
-  if (location.hash.startsWith("#token=")) {
-    sessionStorage.setItem("token", location.hash.slice(7));
-    history.replaceState(null, "", location.pathname);
-  }
   let tool = "look", edits = [], state = {}, shownVersion = -1, players = [], lines, drag;
-
-  const ask = async (path, body) => {
-    const answer = await fetch(path, {
-      method: body === undefined ? "GET" : "POST", body,
-      headers: { Authorization: `Bearer ${sessionStorage.getItem("token") ?? ""}` } });
-    if (!answer.ok) throw new Error((await answer.text()).trim());
-    return answer.json();
-  };
-  const complain = (text) => {
-    byId("problem").textContent = text;
-    byId("problem").hidden = !text;
-  };
 
   // ---- what stands ----
   const here = (player, edit) => edit.slice === player.slice.name && (edit.phase === "all" || edit.phase === player.image.frame);
@@ -72,7 +55,7 @@ const desk = (() => {
       take(await ask("/state"));
       if (state.version !== shownVersion && state.version > 0) await show();
     } catch (error) {
-      complain(error instanceof TypeError ? "The desk has ended: its program does not answer. What was chosen stands in the file." : error.message);
+      complain(endedWords(error));
     }
     setTimeout(follow, state.tracking ? 250 : 1500);
   };
@@ -175,7 +158,6 @@ const desk = (() => {
     }
     return best.line && best;
   };
-  const clamp = (player, [column, row]) => [Math.min(Math.max(column, -0.5), player.slice.columns - 0.5), Math.min(Math.max(row, -0.5), player.slice.rows - 0.5)];
   const begin = (player, at) => {
     if (tool === "line") {
       const found = lineAt(player, at);
@@ -230,27 +212,15 @@ const desk = (() => {
     });
     canvas.addEventListener("pointerup", () => { if (drag?.player === player) end(); });
     canvas.addEventListener("pointercancel", () => { drag = undefined; player.draw(); });
-    const size = document.createElement("button");
-    size.type = "button";
-    size.className = "desk-size";
-    const name = () => { size.textContent = player.holder.classList.contains("cine-large") ? "smaller" : "larger"; };
-    const toggle = () => { player.holder.classList.toggle("cine-large"); name(); player.holder.scrollIntoView({ block: "nearest" }); };
-    name();
-    size.addEventListener("click", toggle);
-    canvas.addEventListener("dblclick", () => { if (tool === "look") toggle(); });
-    player.holder.querySelector(".cine-bar").append(size);
+    sizeButton(player, () => tool === "look");
   };
 
   // ---- the bar ----
-  const toolButtons = [...document.querySelectorAll("button[data-tool]")];
-  const pick = (name) => {
-    tool = document.body.dataset.tool = name;
-    byId("hint").textContent = hints[name];
-    for (const button of toolButtons) button.setAttribute("aria-pressed", String(button.dataset.tool === name));
+  const pick = toolBar(hints, (name) => {
+    tool = name;
     drag = undefined;
     players.forEach((player) => player.draw());
-  };
-  toolButtons.forEach((button) => button.addEventListener("click", () => pick(button.dataset.tool)));
+  });
   byId("undo").addEventListener("click", () => choose({ action: "undo" }));
   byId("track").addEventListener("click", async () => {
     complain("");
@@ -259,8 +229,6 @@ const desk = (() => {
   document.addEventListener("keydown", (event) => {
     if (event.key === "Escape" && drag) { drag = undefined; players.forEach((player) => player.draw()); }
     if ((event.ctrlKey || event.metaKey) && event.key === "z" && edits.length) { event.preventDefault(); choose({ action: "undo" }); }
-    const button = toolButtons[Number(event.key) - 1];
-    if (button && !event.ctrlKey && !event.altKey && !event.metaKey) pick(button.dataset.tool);
   });
   pick("look");
   follow();

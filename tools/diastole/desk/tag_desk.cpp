@@ -1,9 +1,10 @@
-#include "tools/diastole/desk/desk_session.hpp"
+#include "tools/diastole/desk/tag_desk.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -15,6 +16,7 @@
 #include "estimator/report/cine.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/json_text.hpp"
+#include "tools/diastole/desk/embedded.hpp"
 
 namespace diastole::desk {
 namespace {
@@ -42,7 +44,7 @@ void append_line(const fs::path& file, const std::string& line) {
 
 }  // namespace
 
-DeskSession::DeskSession(imaging::TrackRequest request, std::optional<fs::path> tags)
+TagDesk::TagDesk(imaging::TrackRequest request, std::optional<fs::path> tags)
     : request_(std::move(request)), tags_(std::move(tags)) {
   const imaging::ImageFolder folder = imaging::read_image_folder(request_.folder);
   imaging::require_sound(folder);
@@ -55,17 +57,41 @@ DeskSession::DeskSession(imaging::TrackRequest request, std::optional<fs::path> 
   track();
 }
 
-DeskSession::~DeskSession() {
+TagDesk::~TagDesk() {
   const std::scoped_lock lock(mutex_);
   ending_ = true;
 }
 
-std::string DeskSession::file_text() const {
+std::span<const report::PageAsset> TagDesk::assets() const {
+  static const std::array own{report::PageAsset{"/", "text/html; charset=utf-8", embedded::tags_html},
+                              report::PageAsset{"/tags.js", "text/javascript", embedded::tags_js}};
+  return own;
+}
+
+std::optional<DeskAnswer> TagDesk::get(std::string_view path) {
+  if (path == "/state") return answered(json_text(state()));
+  if (path != "/tracking") return std::nullopt;
+  const auto known = tracking();
+  return known ? DeskAnswer{200, known} : refused(503, "The first tracking is at work.");
+}
+
+std::optional<DeskAnswer> TagDesk::post(std::string_view path, const std::string& body) {
+  if (path == "/edits") {
+    append(body);
+  } else if (path == "/track") {
+    track();
+  } else {
+    return std::nullopt;
+  }
+  return answered(json_text(state()));
+}
+
+std::string TagDesk::file_text() const {
   std::error_code error;
   return fs::exists(edits_file(), error) ? read_whole_file(edits_file()) : std::string();
 }
 
-void DeskSession::append(const std::string& choice) {
+void TagDesk::append(const std::string& choice) {
   std::string line;
   try {
     line = json_text(json::parse(choice, no_deeper_than<json>()));  // on one line, whatever came
@@ -89,7 +115,7 @@ void DeskSession::append(const std::string& choice) {
   edits_ = edits;
 }
 
-json DeskSession::edits() const {
+json TagDesk::edits() const {
   json list = json::array();
   for (const imaging::ManualEdit& edit : edits_.standing) {
     json one = json::parse(edit.text);
@@ -99,14 +125,14 @@ json DeskSession::edits() const {
   return list;
 }
 
-DeskSession::Choices DeskSession::choices() const {
+TagDesk::Choices TagDesk::choices() const {
   Choices choices;
   for (const imaging::ManualEdit& edit : edits_.standing)
     choices[edit.slice] += edit.text + "\n";
   return choices;
 }
 
-std::set<std::string> DeskSession::changed() const {
+std::set<std::string> TagDesk::changed() const {
   const Choices now = choices();
   const auto of = [](const Choices& all, const std::string& name) {
     const auto found = all.find(name);
@@ -119,7 +145,7 @@ std::set<std::string> DeskSession::changed() const {
   return names;
 }
 
-void DeskSession::track() {
+void TagDesk::track() {
   const std::set<std::string> names = changed();
   std::vector<imaging::TagView> views;
   {
@@ -141,7 +167,7 @@ void DeskSession::track() {
   });
 }
 
-void DeskSession::work(std::vector<imaging::TagView> views, imaging::ManualEdits edits) {
+void TagDesk::work(std::vector<imaging::TagView> views, imaging::ManualEdits edits) {
   const auto start = std::chrono::steady_clock::now();
   std::string problem;
   std::shared_ptr<const std::string> payload;
@@ -179,7 +205,7 @@ void DeskSession::work(std::vector<imaging::TagView> views, imaging::ManualEdits
   ++version_;
 }
 
-std::string DeskSession::payload_of(const imaging::ManualEdits& edits, double seconds) const {
+std::string TagDesk::payload_of(const imaging::ManualEdits& edits, double seconds) const {
   std::vector<Finding> problems = folder_problems_;
   for (const auto& [name, fault] : faults_)
     problems.push_back(fault);
@@ -197,14 +223,14 @@ std::string DeskSession::payload_of(const imaging::ManualEdits& edits, double se
                      to_json(record));
 }
 
-json DeskSession::state() const {
+json TagDesk::state() const {
   const size_t count = changed().size();
   const std::scoped_lock lock(mutex_);
-  return {{"tracking", tracking_}, {"done", done_},       {"of", of_},
-          {"version", version_},   {"problem", problem_}, {"changed", count}};
+  return {{"tracking", tracking_}, {"done", done_},    {"of", of_},       {"version", version_},
+          {"problem", problem_},   {"changed", count}, {"edits", edits()}};
 }
 
-std::shared_ptr<const std::string> DeskSession::tracking() const {
+std::shared_ptr<const std::string> TagDesk::tracking() const {
   const std::scoped_lock lock(mutex_);
   return payload_;
 }
