@@ -89,6 +89,9 @@ std::vector<FibrePointRow> rows_over_mesh(const FibreEstimate& field) {
   return rows;
 }
 
+/// Above it the field is more than its own measurement: a field of eight elements from apex to base may lack those of the apex.
+constexpr double most_continued = 1.0 / 8;
+
 std::vector<FibrePointRow> rows_at(const FibreEstimate& field, const std::filesystem::path& file) {
   // A mesh fitted to images is right within half a millimetre, a fifth of an element's thickness; four times that is no place of this wall.
   const PointLocator locator(field.lattice.mesh, field.lattice.mesh.reference(), {.outside_xi = 1.0});
@@ -107,6 +110,24 @@ std::vector<FibrePointRow> rows_at(const FibreEstimate& field, const std::filesy
   return rows;
 }
 
+/// The share of the lattice's elements that neither hold a voxel nor touch one that does: there the field goes on as it is elsewhere.
+double continued_share(const FibreLattice& lattice, const std::vector<WallVoxel>& voxels) {
+  std::vector<bool> is_seen(lattice.mesh.element_count(), false), touches(lattice.mesh.node_count(), false);
+  for (const WallVoxel& voxel : voxels)
+    for (const WallSample& sample : voxel.samples)
+      is_seen[sample.element] = true;
+  for (size_t e = 0; e < is_seen.size(); ++e)
+    if (is_seen[e])
+      for (const size_t node : lattice.mesh.element(e))
+        touches[node] = true;
+  size_t continued = 0;
+  for (size_t e = 0; e < is_seen.size(); ++e) {
+    const auto& nodes = lattice.mesh.element(e);
+    if (std::ranges::none_of(nodes, [&](size_t node) { return touches[node]; })) ++continued;
+  }
+  return static_cast<double>(continued) / static_cast<double>(is_seen.size());
+}
+
 void fit_field(FibreSession& session, const FibreSessionRequest& request, const HermiteMesh& wall,
                const std::function<void(const std::string&)>& stage) {
   FibreLattice lattice = fibre_lattice(wall);
@@ -122,6 +143,14 @@ void fit_field(FibreSession& session, const FibreSessionRequest& request, const 
   for (const WallVoxel& voxel : voxels)
     in_wall.push_back(voxel.voxel);
   summarise(session, in_wall);
+  if (const double share = continued_share(lattice, voxels); share > most_continued)
+    session.findings.push_back(
+        {Severity::warning, "fibres-continued",
+         fmt::format("{:.0f} % of the wall lie farther than an element of the field from every voxel: there "
+                     "fibres are continued from the rest, and their errors hold only if they go on as "
+                     "smoothly",
+                     100 * share),
+         session.series.name, 100 * share, "%", "Measure slices from base to apex."});
   session.field = estimate_fibres(lattice, voxels, session.folder, stage);
   // Twice what the tensors' own errors explain: is it the voxels' extent? No scanner's image is without, computed ones may be.
   constexpr double unexplained = 2;

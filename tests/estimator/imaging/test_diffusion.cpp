@@ -401,6 +401,12 @@ TEST_F(NiftiTables, ADirectionThatIsNoNumberIsReadWhereNothingIsWeighted) {
   EXPECT_THAT(test::message_of([&] { (void)read_diffusion(folder.path()); }), HasSubstr("volume 6"));
 }
 
+/// Slices across a part of the ventricle measure that part.
+TEST(Diffusion, AFieldThatIsMostlyContinuedSaysSo) {
+  const FibreSession few = measured({.slices = 3, .noise = 50});
+  EXPECT_THAT(test::ids_of(few.findings), testing::Contains("fibres-continued"));
+}
+
 TEST(Diffusion, AMeshElsewhereIsRefused) {
   DiffusionScan scan{.noise = 50};
   const ScratchFolder folder;
