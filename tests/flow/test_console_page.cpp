@@ -147,9 +147,15 @@ TEST_F(ConsolePage, AStopThatNobodyConfirmsSaysSoAtOnceWhateverIsShown) {
   wait_for("state", "Not homed");
   ::kill(rig->daemon->pid(), SIGSTOP);
   browser->wait_until("document.body.classList.contains('stale')");
+  // By the page's own clock, from the key to the dialog.
+  browser->value(
+      "{ document.addEventListener('keydown', () => { window.asked_ms = performance.now(); }, true); "
+      "new MutationObserver(() => { window.told_ms = window.told_ms || performance.now(); })"
+      ".observe(document.getElementById('problem-dialog'), { attributeFilter: ['open'] }); }");
   browser->press("Escape");
   wait_for("problem-title", "The daemon has not confirmed the stop: press the emergency stop");
   EXPECT_EQ(browser->value("document.getElementById('problem-dialog').open"), true);
+  EXPECT_LT(browser->value("window.told_ms - window.asked_ms").get<double>(), 1000);
   ::kill(rig->daemon->pid(), SIGCONT);
 }
 
