@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "estimator/fe/pressure_volume.hpp"
@@ -111,7 +112,8 @@ SpecimenFamily::SpecimenFamily(Study study, const SpecimenResolution& resolution
 
 SpecimenResolution SpecimenResolution::reaching(double volume_mL) const {
   SpecimenResolution wider = *this;
-  wider.spacing_mL = std::max(spacing_mL, volume_mL / static_cast<double>(points_inflated));
+  const auto strides = static_cast<size_t>(std::ceil(volume_mL / (spacing_mL * static_cast<double>(stride))));
+  wider.points_inflated = std::max(points_inflated, strides * stride);
   return wider;
 }
 

@@ -33,7 +33,8 @@ struct SpecimenResolution {
   size_t points_emptied = 4;
   size_t stride = 4;  ///< between volumes at which meshes are compared; divides both numbers of points
 
-  /// The same up to a larger volume, if need be: curves go on straight beyond their ends.
+  /// The same with more points, up to a larger volume, if need be: curves go on straight beyond their ends. No wider ones: emptied as far
+  /// as it is to be filled no cavity is a body any more.
   [[nodiscard]] SpecimenResolution reaching(double volume_mL) const;
 };
 

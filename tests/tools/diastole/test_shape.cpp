@@ -72,6 +72,16 @@ TEST(Shape, ALevelThatIsLostAltogetherEndsLearning) {
   EXPECT_THAT(lesson.reason, testing::HasSubstr("zero drifts"));
 }
 
+/// As far as it is to be filled no cavity can be emptied.
+TEST(Shape, ASpecimenThatIsToTakeMuchIsEmptiedNoFurther) {
+  const rig::SpecimenResolution coarse{{4, 4, 1}, {4, 4, 1}};
+  const rig::SpecimenFamily family(rig::gel_study(), coarse.reaching(200));
+  const auto& points = family.plain().points();
+  EXPECT_GE(points.back().volume_mL, 200);
+  EXPECT_NEAR(points.front().volume_mL, -coarse.spacing_mL * static_cast<double>(coarse.points_emptied),
+              1e-6);
+}
+
 TEST(Shape, TheNearestDriveKeepsWithinItsBounds) {
   const PeriodicCurve wanted = ventricle().with(16);
   const DriveBounds bounds{.most_mL = 100.0, .flow_mL_s = 90.0, .acceleration_mL_s2 = [](double flow) {
