@@ -176,7 +176,7 @@ imaging::VentricleRequest checked_request(const VentricleArguments& arguments) {
   outputs.add(arguments.output, mesh_file_mark);
   outputs.add(arguments.surface, imaging::surface_file_mark);
   outputs.add(arguments.volumes, imaging::volume_file_mark);
-  outputs.add(arguments.guide, imaging::guide_file_mark);
+  outputs.add(arguments.guide, "");  // a person may have set its points
   outputs.add(arguments.page, report::page_mark);
   return request;
 }
@@ -186,7 +186,7 @@ imaging::GuidePoints given_points(const fs::path& guide,
                                   const std::function<void(const std::string&)>& report_stage) {
   if (!fs::is_directory(guide)) return imaging::read_guide_points(guide);
   report_stage(fmt::format("reading {}", guide.string()));
-  const imaging::Cines cines = imaging::read_cines(guide);
+  const imaging::Cines cines = imaging::read_cines(imaging::read_image_folder(guide));
   report_stage("finding walls in the images");
   return imaging::cine_guide_points(cines);
 }

@@ -1,5 +1,6 @@
 #include "estimator/io/whole_file.hpp"
 
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -39,7 +40,8 @@ void write_whole_file(const fs::path& path, const std::function<void(const fs::p
   std::error_code error;
   try {
     write(unfinished);
-    fs::rename(unfinished, fs::is_symlink(path) ? fs::canonical(path) : path, error);
+    const fs::path place = fs::is_symlink(path) ? fs::canonical(path, error) : path;
+    if (!error) fs::rename(unfinished, place, error);
     if (error) cannot_be_written(path);
   } catch (...) {
     fs::remove(unfinished, error);
@@ -53,6 +55,18 @@ void write_whole_file(const fs::path& path, std::string_view content) {
     stream << content;
     stream.close();
     if (!stream) cannot_be_written(path);
+  });
+}
+
+void write_durable_file(const fs::path& path, std::string_view content) {
+  write_whole_file(path, [&](const fs::path& unfinished) {
+    std::ofstream stream(unfinished, std::ios::binary);
+    stream << content;
+    stream.close();
+    const int file = ::open(unfinished.c_str(), O_RDONLY | O_CLOEXEC);
+    const bool is_kept = stream && file >= 0 && ::fsync(file) == 0;
+    if (file >= 0) ::close(file);
+    if (!is_kept) cannot_be_written(path);
   });
 }
 

@@ -18,6 +18,9 @@ void write_whole_file(const std::filesystem::path& path, std::string_view conten
 void write_whole_file(const std::filesystem::path& path,
                       const std::function<void(const std::filesystem::path& unfinished)>& write);
 
+/// The same, and the disk has it when this returns: what a person has done is in no other file.
+void write_durable_file(const std::filesystem::path& path, std::string_view content);
+
 struct OutputFile {
   std::filesystem::path path;
   std::vector<std::filesystem::path> inputs;  ///< what the command reads: never replaced

@@ -196,7 +196,7 @@ DriveModel fitted_model(const DriveModel& model, const std::vector<GatedRun>& ru
     };
     if (best) search_from(*best);
     if (2.0 * least < problem.measured()) continue;  // the runs before led here
-    // From every start: a fit within the errors may be another hose's and another bubble's, and a far better one be left.
+    // From every start: a fit within the errors may have the wrong effects, and another start lead to a far better one.
     for (const Eigen::VectorXd& start : problem.nearest_starts())
       search_from(start);
   }

@@ -89,7 +89,8 @@ TEST_F(GuideDesk, WhatDoesNotFitChangesNothing) {
         R"({"action": "set", "slice": 0, "phase": 3, "surface": "endo", "at": [[1, 1]]})",
         R"({"action": "set", "slice": 0, "phase": 0, "surface": "aorta", "at": [[1, 1]]})",
         R"({"action": "set", "slice": 0, "phase": 0, "surface": "endo", "at": []})",
-        R"({"action": "remove", "points": []})", R"({"action": "remove", "points": 3})"}) {
+        R"({"action": "remove", "points": []})", R"({"action": "remove", "points": [0.9]})",
+        R"({"action": "remove", "points": 3})"}) {
     const WebAnswer refused = post("/points", bad, token);
     EXPECT_EQ(refused.status, 422) << bad;
     EXPECT_THAT(refused.body, HasSubstr("cines.guide.csv")) << bad;
@@ -103,6 +104,10 @@ TEST_F(GuideDesk, WhatDoesNotFitChangesNothing) {
   EXPECT_THAT(refused.body, HasSubstr("another program has changed it"));
   EXPECT_TRUE(text("cines.guide.csv") == theirs);
   EXPECT_EQ(state()["undoable"], 0);
+  // Moved away, it is nobody's loss: the desk's points are written anew.
+  std::filesystem::rename(place / "cines.guide.csv", place / "theirs.guide.csv");
+  EXPECT_EQ(post_choice({{"action", "remove"}, {"points", {0}}}).status, 200);
+  EXPECT_EQ(guide().points.size(), imaging::guide_points_from_text(found, "found").points.size() - 1);
 }
 
 TEST_F(GuideDesk, FilesThatAreOfSomethingElseAreRefused) {
@@ -113,6 +118,8 @@ TEST_F(GuideDesk, FilesThatAreOfSomethingElseAreRefused) {
   };
   place.write("gp.txt", "x y z contour-type sliceID weight frame\n1 2 3 SAX_LV_ENDOCARDIAL 3 1 0\n");
   EXPECT_THAT(refused("gp.txt"), HasSubstr("is no table of guide points"));
+  place.write("a.edits.jsonl", R"({"slice": "series 2, slice 1", "phase": 2, "action": "mask"})");
+  EXPECT_THAT(refused("a.edits.jsonl"), HasSubstr("is no table of guide points"));
   std::string other = "phase,slice,surface,x_mm,y_mm,z_mm,sigma_mm\n";
   for (int i = 0; i < 9; ++i)
     other += "0,sa01,endo," + std::to_string(i) + ",2,500,0.5\n";
@@ -121,6 +128,13 @@ TEST_F(GuideDesk, FilesThatAreOfSomethingElseAreRefused) {
   EXPECT_EQ(text("other.guide.csv"), other);
   EXPECT_EQ(run(place, {"diastole", "desk", "cines", "--guide", "a.guide.csv", "-o", "b.tags.csv"}).exit_code,
             2);
+  const Ended tags = run(place, {"diastole", "desk", "cines", "-o", "b.tags.csv", "--no-browser"});
+  EXPECT_EQ(tags.exit_code, 2) << "tags are asked for, and there are none";
+  EXPECT_FALSE(std::filesystem::exists(place / "cines.guide.csv"));
+  const Ended again = run(place, {"diastole", "lv", "cines", "-o", "a.mesh", "--guide", "other.guide.csv"});
+  EXPECT_EQ(again.exit_code, 2);
+  EXPECT_THAT(again.err, HasSubstr("--force")) << "a person may have set those points";
+  EXPECT_TRUE(text("other.guide.csv") == other);
 }
 
 TEST_F(GuideDesk, PointsInNoneOfTheImagesAreKept) {

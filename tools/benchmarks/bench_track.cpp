@@ -164,8 +164,7 @@ class Scorer {
   void add_harmonic(const imaging::TrackedSlice& slice, const imaging::TagPoint& point, size_t phase,
                     double error_mm, double sign) {
     const imaging::SlicePlane& plane = slice.view.plane;
-    const Eigen::Vector3d from_mm = point.x_mm - plane.origin_mm;
-    const Eigen::Vector2d in_plane_mm(from_mm.dot(plane.along_row), from_mm.dot(plane.along_column));
+    const Eigen::Vector2d in_plane_mm = plane.in_plane_mm(point.x_mm);
     for (size_t k = 0; k < slice.view.frames.size(); ++k) {
       if (slice.view.frames[k] != point.frame) continue;
       for (const imaging::TagWave& wave : slice.tracked.waves) {

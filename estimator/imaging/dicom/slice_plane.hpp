@@ -23,6 +23,19 @@ struct SlicePlane {
   [[nodiscard]] Eigen::Vector3d at(const Eigen::Vector2d& in_plane_mm) const {
     return origin_mm + in_plane_mm.x() * along_row + in_plane_mm.y() * along_column;
   }
+  /// And back, of a place's foot in the plane.
+  [[nodiscard]] Eigen::Vector2d in_plane_mm(const Eigen::Vector3d& place_mm) const {
+    const Eigen::Vector3d from = place_mm - origin_mm;
+    return {from.dot(along_row), from.dot(along_column)};
+  }
+  /// Column and row of the same, from the first pixel's centre.
+  [[nodiscard]] Eigen::Vector2d pixel(const Eigen::Vector3d& place_mm) const {
+    return in_plane_mm(place_mm).cwiseQuotient(Eigen::Vector2d(column_spacing_mm, row_spacing_mm));
+  }
+  /// Along the normal.
+  [[nodiscard]] double across_mm(const Eigen::Vector3d& place_mm) const {
+    return normal().dot(place_mm - origin_mm);
+  }
   [[nodiscard]] double finer_spacing_mm() const { return std::min(column_spacing_mm, row_spacing_mm); }
 };
 

@@ -89,9 +89,6 @@ std::vector<FibrePointRow> rows_over_mesh(const FibreEstimate& field) {
   return rows;
 }
 
-/// Above it the field is more than its own measurement: a field of eight elements from apex to base may lack those of the apex.
-constexpr double most_continued = 1.0 / 8;
-
 std::vector<FibrePointRow> rows_at(const FibreEstimate& field, const std::filesystem::path& file) {
   // A mesh fitted to images is right within half a millimetre, a fifth of an element's thickness; four times that is no place of this wall.
   const PointLocator locator(field.lattice.mesh, field.lattice.mesh.reference(), {.outside_xi = 1.0});
@@ -110,7 +107,10 @@ std::vector<FibrePointRow> rows_at(const FibreEstimate& field, const std::filesy
   return rows;
 }
 
-/// The share of the lattice's elements that neither hold a voxel nor touch one that does: there the field goes on as it is elsewhere.
+/// Of the field's elements: more than one row of its eight from apex to base. The apex's alone holds few voxels.
+constexpr double most_continued = 1.0 / 8;
+
+/// The share of the field's elements that neither hold a voxel nor have a node in common with one that does: there it goes on as elsewhere.
 double continued_share(const FibreLattice& lattice, const std::vector<WallVoxel>& voxels) {
   std::vector<bool> is_seen(lattice.mesh.element_count(), false), touches(lattice.mesh.node_count(), false);
   for (const WallVoxel& voxel : voxels)
@@ -146,9 +146,8 @@ void fit_field(FibreSession& session, const FibreSessionRequest& request, const 
   if (const double share = continued_share(lattice, voxels); share > most_continued)
     session.findings.push_back(
         {Severity::warning, "fibres-continued",
-         fmt::format("{:.0f} % of the wall lie farther than an element of the field from every voxel: there "
-                     "fibres are continued from the rest, and their errors hold only if they go on as "
-                     "smoothly",
+         fmt::format("{:.0f} % of the field's elements hold no voxel and touch none that does: there fibres "
+                     "are continued from the rest, and their errors hold only if they go on as smoothly",
                      100 * share),
          session.series.name, 100 * share, "%", "Measure slices from base to apex."});
   session.field = estimate_fibres(lattice, voxels, session.folder, stage);

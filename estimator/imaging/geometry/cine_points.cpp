@@ -105,7 +105,7 @@ class CineFinder {
       // A slice that the base cuts, or nearly, shows two things at once.
       const double top_mm = cines_.height_mm(cines_.crossing_mm(slice)) + 0.5 * slice.plane.thickness_mm;
       if (slice.is_long || !slice.has(phase) || top_mm > base_mm) continue;
-      Vector2d centre = on_image(slice.plane, cines_.crossing_mm(slice));
+      Vector2d centre = slice.plane.in_plane_mm(cines_.crossing_mm(slice));
       // The slice may be displaced: its centre is that of its contour.
       for (int i = 0; i < 3; ++i) {
         contours[s] = contour_from(slice, slice.images[phase], centre);
@@ -143,8 +143,8 @@ class CineFinder {
   void find_long(size_t phase, size_t s) {
     const CineSlice& slice = cines_.slices[s];
     const Eigen::ArrayXXd& image = slice.images[phase];
-    const Vector2d middle = on_image(slice.plane, cines_.axis_point_mm);
-    const Vector2d up = (on_image(slice.plane, cines_.axis_point_mm + cines_.axis) - middle).normalized();
+    const Vector2d middle = slice.plane.in_plane_mm(cines_.axis_point_mm);
+    const Vector2d up = (slice.plane.in_plane_mm(cines_.axis_point_mm + cines_.axis) - middle).normalized();
     // The apex of the cavity, from the middle of the blood downwards.
     const std::optional<WallOnRay> apex = wall_on_ray(slice, profile_of(slice, image, middle, -up));
     if (!apex) return;

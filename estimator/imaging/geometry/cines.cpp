@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "estimator/imaging/geometry/wall_rays.hpp"
-#include "estimator/imaging/series/image_folder.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole::imaging {
@@ -43,6 +42,7 @@ GreyLevels levels_of(const std::vector<CineSlice>& slices) {
   }
   return {mean[0], mean[1], mean[2]};
 }
+
 class CineReader {
  public:
   explicit CineReader(const ImageFolder& folder) {
@@ -184,9 +184,10 @@ class CineReader {
   [[nodiscard]] bool points_to_base() const {
     int votes = 0;
     for (const CineSlice& slice : cines_.slices) {
-      const Vector2d centre = on_image(slice.plane, cines_.axis_point_mm);
+      const Vector2d centre = slice.plane.in_plane_mm(cines_.axis_point_mm);
       if (slice.is_long) {
-        const Vector2d up = (on_image(slice.plane, cines_.axis_point_mm + cines_.axis) - centre).normalized();
+        const Vector2d up =
+            (slice.plane.in_plane_mm(cines_.axis_point_mm + cines_.axis) - centre).normalized();
         const auto closed = [&](const Vector2d& d) {
           return wall_on_ray(slice, profile_of(slice, slice.first_image(), centre, d)).has_value();
         };
@@ -244,10 +245,9 @@ Vector3d Cines::crossing_mm(const CineSlice& slice) const {
   return axis_point_mm + axis * (n.dot(slice.plane.origin_mm - axis_point_mm) / n.dot(axis));
 }
 
-Cines read_cines(const std::filesystem::path& folder) {
-  const ImageFolder images = read_image_folder(folder);
-  require_sound(images);
-  return CineReader(images).done();
+Cines read_cines(const ImageFolder& folder) {
+  require_sound(folder);
+  return CineReader(folder).done();
 }
 
 }  // namespace diastole::imaging

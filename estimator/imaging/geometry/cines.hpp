@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "estimator/imaging/dicom/slice_plane.hpp"
+#include "estimator/imaging/series/image_folder.hpp"
 #include "estimator/io/finding.hpp"
 
 namespace diastole::imaging {
@@ -36,12 +37,6 @@ struct CineSlice {
   }
 };
 
-/// In-plane mm of a place, from the first pixel's centre.
-inline Eigen::Vector2d on_image(const SlicePlane& plane, const Eigen::Vector3d& place_mm) {
-  const Eigen::Vector3d from = place_mm - plane.origin_mm;
-  return {from.dot(plane.along_row), from.dot(plane.along_column)};
-}
-
 struct Cines {
   std::filesystem::path folder;
   std::vector<CineSlice> slices;  ///< short-axis ones sa00 (apical) upwards, then long-axis ones la0 upwards
@@ -60,6 +55,6 @@ struct Cines {
 };
 
 /// Throws InputError where the folder is not sound or has fewer than three slices of cines.
-Cines read_cines(const std::filesystem::path& folder);
+Cines read_cines(const ImageFolder& folder);
 
 }  // namespace diastole::imaging

@@ -59,6 +59,12 @@ struct Line {
     if (!value || !std::isfinite(*value)) fail(column, fmt::format("\"{}\" is not a number", text));
     return *value;
   }
+  [[nodiscard]] double coordinate_in(std::string_view text, std::string_view column) const {
+    constexpr double farthest_mm = 1e5;  // no scanner reaches so far
+    const double value = number_in(text, column);
+    if (std::abs(value) > farthest_mm) fail(column, fmt::format("{} mm lies outside any scanner", text));
+    return value;
+  }
   [[nodiscard]] int count_in(std::string_view text, std::string_view column) const {
     const double value = number_in(text, column);
     constexpr double most = 100000;  // phases of a cine: a number beyond is another column
@@ -154,26 +160,25 @@ void add_csv_row(Gatherer& gatherer, const Line& line, std::string_view text, co
   if (fields.size() != columns.count)
     line.fail("", fmt::format("has {} columns instead of {}", fields.size(), columns.count));
   const auto field = [&](size_t column) { return trimmed(fields[*columns.at[column]]); };
-  const auto* surface = std::find_if(surface_names.begin(), surface_names.end(),
-                                     [&](const auto& name) { return is_same_word(name.first, field(2)); });
-  if (surface == surface_names.end())
+  const std::optional<GuideSurface> surface = surface_named(field(2));
+  if (!surface)
     line.fail("surface", fmt::format("\"{}\" is none of endo, epi, base, apex_endo, apex_epi", field(2)));
   if (field(1).empty()) line.fail("slice", "is empty");
   const double sigma_mm =
       columns.has_sigma() ? line.number_in(field(6), "sigma_mm") : columns.default_sigma_mm;
   if (!(sigma_mm > 0)) line.fail("sigma_mm", fmt::format("{} is not above 0", field(6)));
-  gatherer.add(
-      line.count_in(field(0), "phase"), field(1), surface->second,
-      {line.number_in(field(3), "x_mm"), line.number_in(field(4), "y_mm"), line.number_in(field(5), "z_mm")},
-      sigma_mm);
+  gatherer.add(line.count_in(field(0), "phase"), field(1), *surface,
+               {line.coordinate_in(field(3), "x_mm"), line.coordinate_in(field(4), "y_mm"),
+                line.coordinate_in(field(5), "z_mm")},
+               sigma_mm);
 }
 
 void add_gpfile_row(Gatherer& gatherer, const Line& line, std::string_view text, double sigma_mm) {
   const std::vector<std::string_view> fields = split(text, " \t", true);
   if (fields.size() != 6 && fields.size() != 7)
     line.fail("", fmt::format("has {} columns instead of 7", fields.size()));
-  const Eigen::Vector3d place_mm(line.number_in(fields[0], "x"), line.number_in(fields[1], "y"),
-                                 line.number_in(fields[2], "z"));
+  const Eigen::Vector3d place_mm(line.coordinate_in(fields[0], "x"), line.coordinate_in(fields[1], "y"),
+                                 line.coordinate_in(fields[2], "z"));
   const int frame = line.count_in(fields.back(), "frame");
   const double weight = fields.size() == 7 ? line.number_in(fields[5], "weight") : 1.0;
   if (weight < 0) line.fail("weight", fmt::format("{} is negative", fields[5]));
@@ -193,6 +198,17 @@ std::string_view name_of(GuideSurface surface) {
   return std::find_if(surface_names.begin(), surface_names.end(),
                       [&](const auto& name) { return name.second == surface; })
       ->first;
+}
+
+std::optional<GuideSurface> surface_named(std::string_view name) {
+  for (const auto& [word, surface] : surface_names)
+    if (is_same_word(word, name)) return surface;
+  return std::nullopt;
+}
+
+bool is_guide_table(std::string_view text) {
+  text = without_byte_order_mark(text);
+  return csv_columns(trimmed(text.substr(0, text.find('\n'))), click_sigma_mm).has_value();
 }
 
 GuidePoints guide_points_from_text(std::string_view text, const std::string& file, double default_sigma_mm) {

@@ -11,6 +11,7 @@
 
 #include <Eigen/Dense>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -29,6 +30,7 @@ constexpr bool is_apex(GuideSurface surface) {
   return surface == GuideSurface::apex_endo || surface == GuideSurface::apex_epi;
 }
 std::string_view name_of(GuideSurface surface);
+std::optional<GuideSurface> surface_named(std::string_view name);
 
 struct GuidePoint {
   size_t phase = 0;  ///< index into GuidePoints::phases
@@ -46,6 +48,9 @@ struct GuidePoints {
   std::vector<Finding> findings;  ///< what the file holds beside a left ventricle
 };
 
+/// Of a click, where nothing is stated.
+inline constexpr double click_sigma_mm = 0.5;
+
 inline constexpr std::string_view guide_file_mark = "phase,slice,surface,x_mm,y_mm,z_mm,sigma_mm";
 
 /// Throws InputError with file, line, value and remedy.
@@ -53,7 +58,9 @@ GuidePoints read_guide_points(const std::filesystem::path& path);
 /// The same from text; `file` stands for it in messages. `default_sigma_mm`: of a GPFile's points of weight one, and where a
 /// table has no sigma_mm; the fit finds the error's true size.
 GuidePoints guide_points_from_text(std::string_view text, const std::string& file,
-                                   double default_sigma_mm = 0.5);
+                                   double default_sigma_mm = click_sigma_mm);
+/// Whether its first line is a table's, as guide_file_text writes one.
+bool is_guide_table(std::string_view text);
 std::string guide_file_text(const GuidePoints& points);
 
 }  // namespace diastole::imaging

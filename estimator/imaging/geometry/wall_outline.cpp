@@ -2,7 +2,6 @@
 
 #include <numbers>
 
-#include "estimator/imaging/geometry/cines.hpp"
 #include "estimator/imaging/geometry/wall_map.hpp"
 
 namespace diastole::imaging {
@@ -20,7 +19,7 @@ void cut_triangle(const std::array<Vector3d, 3>& corners, const std::array<doubl
     const size_t b = (a + 1) % 3;
     if ((above[a] < 0) == (above[b] < 0)) continue;
     const double part = above[a] / (above[a] - above[b]);
-    piece[ends++] = on_image(plane, corners[a] + part * (corners[b] - corners[a]));
+    piece[ends++] = plane.in_plane_mm(corners[a] + part * (corners[b] - corners[a]));
   }
   if (ends == 2) pieces.push_back(piece);
 }

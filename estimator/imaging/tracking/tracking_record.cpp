@@ -32,11 +32,9 @@ TrackedSliceImages slice_record(const TrackedSlice& slice, const std::vector<Dro
     image.picture = grey_picture(slice.view.images[k], white);
     for (const TagPoint& point : slice.points.points) {
       if (point.frame != image.frame) continue;
-      const Eigen::Vector3d from_mm = point.x_mm - plane.origin_mm;
+      const Eigen::Vector2d pixel = plane.pixel(point.x_mm);
       for (const double number : {static_cast<double>(point.direction), static_cast<double>(point.tag),
-                                  from_mm.dot(plane.along_row) / plane.column_spacing_mm,
-                                  from_mm.dot(plane.along_column) / plane.row_spacing_mm,
-                                  point.sigma_mm / plane.finer_spacing_mm()})
+                                  pixel.x(), pixel.y(), point.sigma_mm / plane.finer_spacing_mm()})
         image.points.push_back(number);
     }
     for (const RejectedPoint& point : slice.points.rejected) {

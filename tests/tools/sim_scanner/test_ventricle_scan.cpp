@@ -35,7 +35,8 @@ TEST_F(VentricleScan, WallsAndBaseAreFoundInItsCines) {
   protocol_.long_axis_deg = {};
   protocol_.seed = 0;
   scan_phases(3, 0.13);
-  const imaging::GuidePoints guide = imaging::cine_guide_points(imaging::read_cines(scratch_.path()));
+  const imaging::GuidePoints guide =
+      imaging::cine_guide_points(imaging::read_cines(imaging::read_image_folder(scratch_.path())));
   ASSERT_EQ(guide.phases.size(), 4U);
   int walls = 0, base = 0;
   for (const imaging::GuidePoint& point : guide.points) {
@@ -71,8 +72,8 @@ std::vector<double> inner_radius_mm(const imaging::GuidePoints& guide) {
 
 TEST_F(VentricleScan, AMissingImageMovesNoOtherToItsPhase) {
   scan_phases(6);
-  const std::vector<double> whole =
-      inner_radius_mm(imaging::cine_guide_points(imaging::read_cines(scratch_.path())));
+  const std::vector<double> whole = inner_radius_mm(
+      imaging::cine_guide_points(imaging::read_cines(imaging::read_image_folder(scratch_.path()))));
   // Of one half of the slices the third image is lost, of the other the fifth: all have five.
   const imaging::ImageFolder folder = imaging::read_image_folder(scratch_.path());
   size_t count = 0;
@@ -80,7 +81,8 @@ TEST_F(VentricleScan, AMissingImageMovesNoOtherToItsPhase) {
     for (const imaging::SliceImages& slice : series.slices)
       std::filesystem::remove(folder.files[folder.images[slice.images[count++ % 2 == 0 ? 2 : 4]].file]);
   ASSERT_EQ(count, 7U);
-  const imaging::GuidePoints guide = imaging::cine_guide_points(imaging::read_cines(scratch_.path()));
+  const imaging::GuidePoints guide =
+      imaging::cine_guide_points(imaging::read_cines(imaging::read_image_folder(scratch_.path())));
   ASSERT_EQ(guide.phases.size(), 6U);
   const std::vector<double> found = inner_radius_mm(guide);
   int compared = 0;

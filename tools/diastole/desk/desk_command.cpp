@@ -62,10 +62,11 @@ ExitCode serve(desk::DeskPages& pages, const DeskArguments& arguments, const std
   return ExitCode::done;
 }
 
-/// Tags, or the walls of cines: what the folder has, or what is asked for.
-bool is_for_guide_points(const DeskArguments& arguments) {
+/// The walls of cines, or tags: what is asked for, else what the folder has.
+bool is_for_guide_points(const DeskArguments& arguments, const imaging::ImageFolder& folder) {
   if (arguments.guide) return true;
-  const imaging::ImageFolder folder = imaging::read_image_folder(arguments.request.folder);
+  const imaging::TrackRequest& request = arguments.request;
+  if (arguments.tags || request.edits || request.pose) return false;
   const auto has = [&](imaging::SeriesKind kind) {
     return std::ranges::any_of(folder.series, [&](const auto& series) { return series.kind == kind; });
   };
@@ -73,10 +74,12 @@ bool is_for_guide_points(const DeskArguments& arguments) {
 }
 
 ExitCode run_desk(const DeskArguments& arguments, const CommandOutput& out) {
-  const std::filesystem::path& folder = arguments.request.folder;
-  if (is_for_guide_points(arguments)) {
-    const std::filesystem::path guide = arguments.guide.value_or(imaging::beside(folder, ".guide.csv"));
-    if (!std::filesystem::exists(guide)) require_output({guide, {}, "", false});
+  const imaging::ImageFolder folder = imaging::read_image_folder(arguments.request.folder);
+  if (is_for_guide_points(arguments, folder)) {
+    const std::filesystem::path guide =
+        arguments.guide.value_or(imaging::beside(arguments.request.folder, ".guide.csv"));
+    std::error_code error;
+    if (!std::filesystem::exists(guide, error)) require_output({guide, {}, "", false});
     desk::GuideDesk pages(folder, guide);
     return serve(pages, arguments, "guide", guide, out);
   }
@@ -85,7 +88,7 @@ ExitCode run_desk(const DeskArguments& arguments, const CommandOutput& out) {
     if (arguments.request.pose) inputs.push_back(*arguments.request.pose);
     require_output({*arguments.tags, inputs, imaging::tags_file_mark, arguments.force});
   }
-  desk::TagDesk pages(arguments.request, arguments.tags);
+  desk::TagDesk pages(folder, arguments.request, arguments.tags);
   return serve(pages, arguments, "edits", pages.edits_file(), out);
 }
 
@@ -99,16 +102,13 @@ void add_desk(CommandLine& line) {
       "  diastole desk dicom/ -o gel.tags.csv\n"
       "  diastole desk dicom/ --port 8610 --no-browser     # over ssh -L 8610:127.0.0.1:8610\n"
       "  diastole desk cines/ --guide heart.guide.csv\n"
-      "Tagged images: drag lines, mask regions, draw the wall's contours, undo, track again. Each choice is "
-      "a "
-      "line of FOLDER.edits.jsonl\n"
-      "at once, which `diastole track` and `fit` replay. Cines: set, move and remove guide points on a "
-      "ventricle's walls, and see the\n"
-      "ventricle that is fitted to them; they are in FOLDER.guide.csv at once, which `diastole lv` takes. "
-      "Nothing is done here that a\n"
-      "file could not say. Only this machine is answered, and only with the address that is printed. "
-      "docs/imaging.md and docs/lv.md\n"
-      "say more.");
+      "Tagged images: drag lines, mask regions, draw the wall's contours, undo, track again. Each choice is\n"
+      "a line of FOLDER.edits.jsonl at once, which `diastole track` and `fit` replay.\n"
+      "Cines: set, move and remove guide points on a ventricle's walls, and see the ventricle that is "
+      "fitted\n"
+      "to them. They are in FOLDER.guide.csv at once, which `diastole lv` takes.\n"
+      "Nothing is done here that a file could not say. Only this machine is answered, and only with the\n"
+      "address that is printed. docs/imaging.md and docs/lv.md say more.");
   DeskArguments& a = *arguments;
   command->add_option("FOLDER", a.request.folder, "the folder with the scanner's files")->required();
   auto* guide = command->add_option("--guide", a.guide,
@@ -126,7 +126,8 @@ void add_desk(CommandLine& line) {
       ->excludes(guide);
   command->add_option("--coords", a.request.coordinates, "coordinates of the tag points")
       ->check(CLI::IsMember({"auto", "specimen", "patient"}))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->excludes(guide);
   command->add_option("--port", a.port, "of 127.0.0.1 [any free one]")->check(CLI::Range(0, 65535));
   command->add_flag("--no-browser", a.no_browser, "print the address only");
   command->add_flag("--force", a.force, "replace an output file that is none of track's");

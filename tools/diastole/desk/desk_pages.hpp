@@ -16,7 +16,6 @@ struct DeskAnswer {
   std::shared_ptr<const std::string> body;  ///< JSON; with another status a sentence
 };
 
-/// Made once: what has many bytes is shared, not copied.
 inline DeskAnswer answered(std::string json) {
   return {200, std::make_shared<const std::string>(std::move(json))};
 }

@@ -79,6 +79,8 @@ class Desk {
       if (request.method() == http::verb::post) answer = pages_.post(path, request.body());
     } catch (const InputError& error) {
       return as_text(refused(422, error.what()));
+    } catch (const std::exception& error) {
+      return as_text(refused(500, fmt::format("The desk could not do that: {}", error.what())));
     }
     if (!answer) return as_text(refused(404, "There is no such thing here. The desk is at /."));
     if (answer->status != 200) return as_text(*answer);
@@ -127,7 +129,9 @@ class Connection : public std::enable_shared_from_this<Connection> {
     response_.keep_alive(parser_->get().keep_alive());
     response_.body() = *answer.body;
     response_.prepare_payload();
-    stream_.tcp().expires_after(patience);
+    // A slow line, such as a tunnel to another town, passes a hundred kilobytes in a second.
+    constexpr size_t least_bytes_per_s = 100'000;
+    stream_.tcp().expires_after(patience + std::chrono::seconds(response_.body().size() / least_bytes_per_s));
     http::async_write(stream_, response_, [self = shared_from_this()](error_code error, size_t) {
       if (!error && self->response_.keep_alive()) self->read();
     });

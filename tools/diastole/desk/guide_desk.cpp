@@ -1,6 +1,7 @@
 #include "tools/diastole/desk/guide_desk.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -28,41 +29,26 @@ using imaging::GuideSurface;
 using imaging::SlicePlane;
 using nlohmann::json;
 
-constexpr double click_sigma_mm = 0.5;  // as of points whose file does not say (guide_points.hpp)
 constexpr size_t most_points = 200000;  // of a file; a study of 15 slices and 30 phases has 20,000
-
-Eigen::Vector2d pixel_of(const SlicePlane& plane, const Eigen::Vector3d& place_mm) {
-  const Eigen::Vector2d mm = imaging::on_image(plane, place_mm);
-  return {mm.x() / plane.column_spacing_mm, mm.y() / plane.row_spacing_mm};
-}
-
-double across_mm(const SlicePlane& plane, const Eigen::Vector3d& place_mm) {
-  return plane.normal().dot(place_mm - plane.origin_mm);
-}
-
-std::optional<GuideSurface> surface_named(std::string_view name) {
-  for (const GuideSurface surface : {GuideSurface::endo, GuideSurface::epi, GuideSurface::base,
-                                     GuideSurface::apex_endo, GuideSurface::apex_epi})
-    if (imaging::name_of(surface) == name) return surface;
-  return std::nullopt;
-}
 
 /// In micrometres, as the file holds it: what is fitted here is what `lv` fits.
 Eigen::Vector3d as_written(const Eigen::Vector3d& place_mm) {
   return (1000 * place_mm.array()).round().matrix() / 1000;
 }
 
-/// Whether this is the table that is written here, and no GPFile.
-bool is_table(std::string_view text) {
-  return text.substr(0, text.find('\n')).find(',') != std::string_view::npos;
+/// An index or a point's number. Throws std::invalid_argument for anything else.
+size_t whole(const json& number) {
+  if (!number.is_number_unsigned())
+    throw std::invalid_argument(fmt::format("{} is no whole number from 0 on", json_text(number)));
+  return number.get<size_t>();
 }
 
 }  // namespace
 
-GuideDesk::GuideDesk(const fs::path& folder, fs::path guide)
+GuideDesk::GuideDesk(const imaging::ImageFolder& folder, fs::path guide)
     : file_(std::move(guide)),
       cines_(imaging::read_cines(folder)),
-      images_(std::make_shared<const std::string>(images())),
+      images_(std::make_shared<const std::string>(images_json())),
       phases_(cines_.phases) {
   for (const CineSlice& slice : cines_.slices)
     slices_.push_back(slice.name);
@@ -70,33 +56,42 @@ GuideDesk::GuideDesk(const fs::path& folder, fs::path guide)
   if (!points_.empty()) fit();
 }
 
-void GuideDesk::read_points() {
-  GuidePoints known;
+GuidePoints GuideDesk::known_points() {
   std::error_code error;
-  const bool is_there = fs::exists(file_, error);
-  if (is_there) {
+  if (fs::exists(file_, error)) {
     written_ = read_whole_file(file_);
-    if (!is_table(written_))
+    if (!imaging::is_guide_table(written_))
+      throw InputError({file_.string(), "line 1", "is no table of guide points, and would be replaced by one",
+                        "Name another file. Of a GPFile `diastole lv GPFILE -o ANY.mesh --guide "
+                        "NEW.guide.csv` makes a table."});
+    if (::access(file_.c_str(), W_OK) != 0)
       throw InputError(
-          {file_.string(), "line 1", "is no table of guide points, and would be replaced by one",
-           fmt::format("Make one of a GPFile with `diastole lv {} -o ANY.mesh --guide NEW.guide.csv`.",
-                       file_.string())});
-    if (written_.find_first_not_of("\r\n", std::min(written_.find('\n'), written_.size())) !=
-        std::string::npos)
-      known = imaging::guide_points_from_text(written_, file_.string());
-  } else {
-    try {
-      known = imaging::cine_guide_points(cines_);
-    } catch (const InputError& none) {  // a person can set them
-      problem_ = none.what();
-    }
+          {file_.string(), "", "may not be written", "Copy it, and give the copy with --guide."});
+    const size_t rows = std::min(written_.find('\n'), written_.size());
+    if (written_.find_first_not_of("\r\n", rows) == std::string::npos) return {};  // all were removed
+    return imaging::guide_points_from_text(written_, file_.string());
   }
+  try {
+    return imaging::cine_guide_points(cines_);
+  } catch (const InputError& none) {  // a person can set them
+    problem_ = none.what();
+    return {};
+  }
+}
+
+void GuideDesk::read_points() {
+  GuidePoints known = known_points();
+  if (known.points.size() > most_points)
+    throw InputError({file_.string(), "", fmt::format("has {} points", known.points.size()),
+                      fmt::format("The desk takes {} at most.", most_points)});
+  const bool are_found = written_.empty();
+  findings_ = are_found ? cines_.findings : known.findings;
   for (const std::string& name : known.slices)
     if (std::ranges::find(slices_, name) == slices_.end()) slices_.push_back(name);
   for (const int phase : known.phases)
     if (std::ranges::find(phases_, phase) == phases_.end()) phases_.push_back(phase);
   std::ranges::sort(phases_);
-  for (GuidePoint point : known.points) {
+  for (GuidePoint& point : known.points) {
     const int phase = known.phases[point.phase];
     point.phase = static_cast<size_t>(std::ranges::lower_bound(phases_, phase) - phases_.begin());
     point.place_mm = as_written(point.place_mm);
@@ -105,7 +100,7 @@ void GuideDesk::read_points() {
     points_.emplace(next_++, point);
   }
   require_in_slices();
-  if (!is_there && !points_.empty()) write();
+  if (are_found && !points_.empty()) write();
 }
 
 void GuideDesk::require_in_slices() const {
@@ -113,13 +108,13 @@ void GuideDesk::require_in_slices() const {
     const SlicePlane& plane = cines_.slices[s].plane;
     std::vector<double> apart_mm;
     for (const auto& [id, point] : points_)
-      if (point.slice == s) apart_mm.push_back(std::abs(across_mm(plane, point.place_mm)));
+      if (point.slice == s) apart_mm.push_back(std::abs(plane.across_mm(point.place_mm)));
     if (apart_mm.empty()) continue;
     const auto middle = apart_mm.begin() + static_cast<std::ptrdiff_t>(apart_mm.size() / 2);
     std::ranges::nth_element(apart_mm, middle);
     constexpr double usual_thickness_mm = 5;
     const double thickness_mm = plane.thickness_mm > 0 ? plane.thickness_mm : usual_thickness_mm;
-    if (*middle > thickness_mm)
+    if (*middle > 0.5 * thickness_mm)
       throw InputError({file_.string(), fmt::format("slice {}", cines_.slices[s].name),
                         fmt::format("its points lie {:.1f} mm from the images that are called so", *middle),
                         fmt::format("Give the points of this study; without a file they are found in {}.",
@@ -135,8 +130,8 @@ std::span<const report::PageAsset> GuideDesk::assets() const {
 
 std::optional<DeskAnswer> GuideDesk::get(std::string_view path) {
   if (path == "/images") return DeskAnswer{200, images_};
-  if (path == "/points") return answered(points());
-  if (path == "/state") return answered(state());
+  if (path == "/points") return answered(points_json());
+  if (path == "/state") return answered(state_json());
   if (path != "/fit") return std::nullopt;
   const std::scoped_lock lock(mutex_);
   return fit_ ? DeskAnswer{200, fit_} : refused(503, "No ventricle is fitted yet.");
@@ -150,7 +145,7 @@ std::optional<DeskAnswer> GuideDesk::post(std::string_view path, const std::stri
   } else {
     return std::nullopt;
   }
-  return answered(state());
+  return answered(state_json());
 }
 
 void GuideDesk::change(const std::string& text) {
@@ -208,35 +203,35 @@ GuideDesk::Change GuideDesk::parsed(const json& choice) const {
   };
   Change change;
   if (action == "move") {
-    const size_t id = choice.at("point");
+    const size_t id = whole(choice.at("point"));
     GuidePoint point = known(id);
     const SlicePlane& plane = cine(point.slice).plane;
     point.place_mm = as_written(plane.at(pixel_in(plane, choice.at("to"))) +
-                                across_mm(plane, point.place_mm) * plane.normal());
+                                plane.across_mm(point.place_mm) * plane.normal());
     change[id] = point;
   } else if (action == "set") {
     const std::string surface_name = choice.at("surface");
-    const auto surface = surface_named(surface_name);
+    const auto surface = imaging::surface_named(surface_name);
     if (!surface) throw std::invalid_argument(fmt::format("\"{}\" is no surface", surface_name));
-    const size_t slice = choice.at("slice"), phase = choice.at("phase");
+    const size_t slice = whole(choice.at("slice")), phase = whole(choice.at("phase"));
     const SlicePlane& plane = cine(slice).plane;
     if (phase >= cines_.phases.size() || !cines_.slices[slice].has(phase))
       throw std::invalid_argument(fmt::format("slice {} has no image of phase {}", slices_[slice], phase));
     const json& places = choice.at("at");
-    if (!places.is_array() || places.empty() || points_.size() + places.size() > most_points)
-      throw std::invalid_argument(
-          fmt::format("\"at\" is no list of 1 to {} places", most_points - points_.size()));
+    if (!places.is_array() || places.empty()) throw std::invalid_argument("\"at\" is no list of places");
+    if (points_.size() + places.size() > most_points)
+      throw std::invalid_argument(fmt::format("there are {} points at most", most_points));
     const auto number =
         static_cast<size_t>(std::ranges::lower_bound(phases_, cines_.phases[phase]) - phases_.begin());
     for (const json& place : places)
-      change[next_ + change.size()] =
-          GuidePoint{number, slice, *surface, as_written(plane.at(pixel_in(plane, place))), click_sigma_mm};
+      change[next_ + change.size()] = GuidePoint{
+          number, slice, *surface, as_written(plane.at(pixel_in(plane, place))), imaging::click_sigma_mm};
   } else if (action == "remove") {
     const json& ids = choice.at("points");
     if (!ids.is_array()) throw std::invalid_argument("\"points\" is no list");
     for (const json& id : ids) {
-      (void)known(id.get<size_t>());
-      change[id.get<size_t>()] = std::nullopt;
+      (void)known(whole(id));
+      change[whole(id)] = std::nullopt;
     }
     if (change.empty()) throw std::invalid_argument("no point is named");
   } else {
@@ -264,7 +259,7 @@ GuidePoints GuideDesk::guide() const {
   for (const auto& [id, point] : points_)
     shown.insert(point.phase);
   GuidePoints guide{.file = file_.string(), .phases = {}, .slices = slices_, .points = {}, .findings = {}};
-  guide.findings = cines_.findings;
+  guide.findings = findings_;
   for (const size_t phase : shown)
     guide.phases.push_back(phases_[phase]);
   for (const auto& [id, point] : points_) {
@@ -276,11 +271,13 @@ GuidePoints GuideDesk::guide() const {
 
 void GuideDesk::write() {
   std::error_code error;
-  if (fs::exists(file_, error) ? read_whole_file(file_) != written_ : !written_.empty())
-    throw InputError({file_.string(), "", "another program has changed it since the desk read it",
-                      "Open the desk again."});
+  if (fs::exists(file_, error) && read_whole_file(file_) != written_)
+    throw InputError(
+        {file_.string(), "", "another program has changed it since the desk read it",
+         "Open the desk again; or move that file away, and the next change here writes the desk's "
+         "points anew."});
   std::string text = imaging::guide_file_text(guide());
-  write_whole_file(file_, text);
+  write_durable_file(file_, text);
   written_ = std::move(text);
 }
 
@@ -292,15 +289,15 @@ void GuideDesk::fit() {
     problem_.clear();
   }
   if (worker_.joinable()) worker_.join();
-  worker_ = std::jthread([this, guide = guide(), version = version_] { work(guide, version); });
+  worker_ = std::jthread([this, guide = guide(), version = version_] { run_fit(guide, version); });
 }
 
-void GuideDesk::work(const GuidePoints& guide, size_t version) {
+void GuideDesk::run_fit(const GuidePoints& guide, size_t version) {
   std::string problem;
   std::shared_ptr<const std::string> answer;
   try {
     answer = std::make_shared<const std::string>(
-        fitted(imaging::measure_ventricle({.guide = file_}, guide), version));
+        fit_json(imaging::measure_ventricle({.guide = file_}, guide), version));
   } catch (const std::exception& error) {
     problem = error.what();
   }
@@ -312,7 +309,7 @@ void GuideDesk::work(const GuidePoints& guide, size_t version) {
   fitted_version_ = version;
 }
 
-std::string GuideDesk::fitted(const imaging::VentricleSession& session, size_t version) const {
+std::string GuideDesk::fit_json(const imaging::VentricleSession& session, size_t version) const {
   const imaging::VentricleFit& fit = session.fit;
   json phases = json::array(), slices = json::array();
   for (size_t s = 0; s < cines_.slices.size(); ++s)
@@ -343,11 +340,6 @@ std::string GuideDesk::fitted(const imaging::VentricleSession& session, size_t v
       }
     }
   }
-  for (const imaging::SliceShift& shift : fit.shifts) {
-    const auto slice = std::ranges::find(cines_.slices, shift.slice, &CineSlice::name);
-    if (slice != cines_.slices.end())
-      slices[static_cast<size_t>(slice - cines_.slices.begin())]["shift_mm"] = shift.shift_mm.norm();
-  }
   return json_text(json{{"version", version},
                         {"phases", std::move(phases)},
                         {"slices", std::move(slices)},
@@ -357,7 +349,7 @@ std::string GuideDesk::fitted(const imaging::VentricleSession& session, size_t v
                         {"problems", json::parse(json_text(written(fit.findings)))}});
 }
 
-std::string GuideDesk::images() const {
+std::string GuideDesk::images_json() const {
   std::vector<imaging::Image> all;  // grey values mean the same in all slices
   for (const CineSlice& slice : cines_.slices)
     for (const Eigen::ArrayXXd& image : slice.images)
@@ -383,19 +375,19 @@ std::string GuideDesk::images() const {
       json{{"folder", cines_.folder.string()}, {"guide", file_.string()}, {"slices", std::move(slices)}});
 }
 
-std::string GuideDesk::points() const {
+std::string GuideDesk::points_json() const {
   json list = json::array();
   for (const auto& [id, point] : points_) {
     const auto phase = std::ranges::find(cines_.phases, phases_[point.phase]);
     if (point.slice >= cines_.slices.size() || phase == cines_.phases.end()) continue;
-    const Eigen::Vector2d pixel = pixel_of(cines_.slices[point.slice].plane, point.place_mm);
+    const Eigen::Vector2d pixel = cines_.slices[point.slice].plane.pixel(point.place_mm);
     list.push_back({id, point.slice, phase - cines_.phases.begin(), imaging::name_of(point.surface),
                     pixel.x(), pixel.y(), point.sigma_mm});
   }
   return json_text(json{{"version", version_}, {"points", std::move(list)}});
 }
 
-std::string GuideDesk::state() const {
+std::string GuideDesk::state_json() const {
   const auto elsewhere = std::ranges::count_if(points_, [&](const auto& one) {
     const GuidePoint& point = one.second;
     return point.slice >= cines_.slices.size() ||

@@ -5,7 +5,9 @@
 //   GET /images              {"folder", "guide", "slices": [{"name", "view", "rows", "columns", "pixel_mm", "images": [{"frame", "trigger_ms",
 //                            "picture"}]}]}: a picture is 8 bits a pixel in base64, empty where the slice lacks the phase
 //   GET /points              {"version", "points": [[id, slice, phase, surface, column, row, sigma_mm], ...]}; slice and phase are indices
-//   GET /fit                 the walls where images show them; 503 before there are any
+//   GET /fit                 the walls where images show them; 503 before there are any: {"version", "phases": [{"cavity_mL", "cavity_sigma_mL",
+//                            "wall_mL"} or null], "slices": [{"inner", "outer"}], "rms_mm", "noise_factor", "converged", "problems"}: of a slice for
+//                            each phase pieces of lines, four numbers each: column, row, column, row
 //   GET /state               {"version", "points", "elsewhere", "undoable", "fitting", "fitted_version", "problem"}
 //   POST /points             one change (GuideDesk::change); answers as /state does
 //   POST /fit                fits again; answers as /state does
@@ -30,7 +32,7 @@ class GuideDesk final : public DeskPages {
  public:
   /// Points are those of `guide`; where there is no such file, those that are found in the cines, and the file is written. Throws InputError for
   /// a folder without cines, and for points that lie in none of their slices.
-  GuideDesk(const std::filesystem::path& folder, std::filesystem::path guide);
+  GuideDesk(const imaging::ImageFolder& folder, std::filesystem::path guide);
   /// Waits for a fit.
   ~GuideDesk() override = default;
 
@@ -39,16 +41,18 @@ class GuideDesk final : public DeskPages {
   std::optional<DeskAnswer> post(std::string_view path, const std::string& body) override;
 
  private:
-  /// Points by a number that they keep; of a change the values to set, nothing: to take away.
+  /// The new value of each point by its number, which it keeps; no value removes it.
   using Change = std::map<size_t, std::optional<imaging::GuidePoint>>;
 
+  /// Of the file or, where there is none, found in the images; none where none are seen.
+  imaging::GuidePoints known_points();
   void read_points();
   void require_in_slices() const;
   /// {"action": "move", "point": id, "to": [column, row]}
   /// {"action": "set", "slice": index, "phase": index, "surface": "endo", "at": [[column, row], ...]}
   /// {"action": "remove", "points": [id, ...]}
   /// {"action": "undo"}
-  /// The file holds it when this returns. Throws InputError, and leaves points and file as they are, if it does not fit.
+  /// The disk has it when this returns. Throws InputError, and leaves points and file as they are, if it does not fit.
   void change(const std::string& text);
   [[nodiscard]] Change parsed(const nlohmann::json& choice) const;
   /// Sets the points, and returns the change that takes it back.
@@ -57,18 +61,19 @@ class GuideDesk final : public DeskPages {
   [[nodiscard]] imaging::GuidePoints guide() const;
   void write();
   void fit();
-  void work(const imaging::GuidePoints& guide, size_t version);
-  [[nodiscard]] std::string fitted(const imaging::VentricleSession& session, size_t version) const;
+  void run_fit(const imaging::GuidePoints& guide, size_t version);
 
-  [[nodiscard]] std::string images() const;
-  [[nodiscard]] std::string points() const;
-  [[nodiscard]] std::string state() const;
+  [[nodiscard]] std::string images_json() const;
+  [[nodiscard]] std::string points_json() const;
+  [[nodiscard]] std::string fit_json(const imaging::VentricleSession& session, size_t version) const;
+  [[nodiscard]] std::string state_json() const;
 
   const std::filesystem::path file_;
   const imaging::Cines cines_;
   const std::shared_ptr<const std::string> images_;
   std::vector<int> phases_;          // the cines' and the file's, rising
   std::vector<std::string> slices_;  // the cines', then others of the file
+  std::vector<Finding> findings_;    // of the points' source
   std::map<size_t, imaging::GuidePoint> points_;
   size_t next_ = 0, version_ = 1;
   std::vector<Change> undoing_;

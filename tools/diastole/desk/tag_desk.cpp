@@ -44,9 +44,9 @@ void append_line(const fs::path& file, const std::string& line) {
 
 }  // namespace
 
-TagDesk::TagDesk(imaging::TrackRequest request, std::optional<fs::path> tags)
+TagDesk::TagDesk(const imaging::ImageFolder& folder, imaging::TrackRequest request,
+                 std::optional<fs::path> tags)
     : request_(std::move(request)), tags_(std::move(tags)) {
-  const imaging::ImageFolder folder = imaging::read_image_folder(request_.folder);
   imaging::require_sound(folder);
   folder_problems_ = folder.problems;
   std::vector<Finding> told_later;

@@ -25,9 +25,10 @@ namespace diastole::desk {
 
 class TagDesk final : public DeskPages {
  public:
-  /// Reads folder and choices, and begins to track. `tags`: where the points go after each tracking. Throws InputError for a folder that
+  /// Reads the choices, and begins to track. `tags`: where the points go after each tracking. Throws InputError for a folder that
   /// is not sound or without tags, and for choices that do not fit it.
-  TagDesk(imaging::TrackRequest request, std::optional<std::filesystem::path> tags);
+  TagDesk(const imaging::ImageFolder& folder, imaging::TrackRequest request,
+          std::optional<std::filesystem::path> tags);
   /// Waits for the slices that are being tracked; the others are given up.
   ~TagDesk() override;
 

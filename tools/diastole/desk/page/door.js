@@ -7,9 +7,14 @@ const deskDoor = (() => {
     history.replaceState(null, "", location.pathname);
   }
   const ask = async (path, body) => {
-    const answer = await fetch(path, {
-      method: body === undefined ? "GET" : "POST", body,
-      headers: { Authorization: `Bearer ${sessionStorage.getItem("token") ?? ""}` } });
+    let answer;
+    try {
+      answer = await fetch(path, {
+        method: body === undefined ? "GET" : "POST", body,
+        headers: { Authorization: `Bearer ${sessionStorage.getItem("token") ?? ""}` } });
+    } catch {
+      throw new Error("The desk has ended: its program does not answer. What was chosen stands in the file.");
+    }
     if (!answer.ok) throw new Error((await answer.text()).trim());
     return answer.json();
   };
@@ -17,8 +22,6 @@ const deskDoor = (() => {
     byId("problem").textContent = text;
     byId("problem").hidden = !text;
   };
-  const endedWords = (error) =>
-    error instanceof TypeError ? "The desk has ended: its program does not answer. What was chosen stands in the file." : error.message;
   const clamp = (player, [column, row]) => [Math.min(Math.max(column, -0.5), player.slice.columns - 0.5), Math.min(Math.max(row, -0.5), player.slice.rows - 0.5)];
 
   // A button that makes a picture large; a double click does, where `mayClick` lets it.
@@ -50,5 +53,5 @@ const deskDoor = (() => {
     });
     return pick;
   };
-  return { byId, ask, complain, endedWords, clamp, sizeButton, toolBar };
+  return { byId, ask, complain, clamp, sizeButton, toolBar };
 })();

@@ -1,7 +1,7 @@
 // The desk of cines: guide points with handles, and the fitted ventricle's walls under them. Every change goes to the server, which has it in
 // the file before it answers; what is shown is its points.
 const desk = (() => {
-  const { byId, ask, complain, endedWords, clamp, sizeButton, toolBar } = deskDoor;
+  const { byId, ask, complain, clamp, sizeButton, toolBar } = deskDoor;
   const hints = {
     look: "Point at a point for what it is. Lines are the fitted walls. Double-click makes a picture large; the slider above the pictures moves them all.",
     move: "Pull a point to where this wall is seen. Then fit again.",
@@ -13,15 +13,16 @@ const desk = (() => {
   const colours = { endo: "#ffd84a", epi: "#8dff9e", base: "#6db8ff", apex_endo: "#ffa640", apex_epi: "#4fe0c0" };
   const names = { endo: "inner wall", epi: "outer wall", base: "base", apex_endo: "inner apex", apex_epi: "outer apex" };
   const apartMm = 4; // of points that are drawn along an edge
-  let tool = "look", state = {}, points = [], fit, players = [], drag, playing, known = { points: 0, fit: 0 };
+  let tool = "look", state = {}, points = [], fit, players = [], drag, playing, known = { points: 0, fit: 0, problem: "" };
 
   // ---- what stands ----
-  const here = (player, point) => point.slice === player.index && point.phase === player.phase;
+  const here = (player, point, phase = player.phase) => point.slice === player.index && point.phase === phase;
   const pixelMm = (player) => player.slice.pixel_mm;
   const measures = () => {
     const phase = Number(byId("phase").value), one = fit?.phases[phase], image = players[0]?.slice.images[phase];
     if (!image) return;
-    const words = one ? `cavity ${one.cavity_mL.toFixed(1)} \u00b1 ${one.cavity_sigma_mL.toFixed(1)} mL, wall ${one.wall_mL.toFixed(1)} mL` : "not fitted";
+    const number = (value) => value?.toFixed(1) ?? "?"; // null: not a number
+    const words = one ? `cavity ${number(one.cavity_mL)} \u00b1 ${number(one.cavity_sigma_mL)} mL, wall ${number(one.wall_mL)} mL` : "not fitted";
     byId("measures").textContent = `phase ${image.frame}: ${words}`;
   };
   const showFindings = () => {
@@ -51,7 +52,8 @@ const desk = (() => {
     byId("fit").disabled = state.fitting || state.points === 0 || state.fitted_version === state.version;
     const elsewhere = state.elsewhere ? ` (${state.elsewhere} of them in none of these images)` : "";
     byId("progress").textContent = `${state.points} points${elsewhere}; ` + (state.fitting ? "fitting \u2026" : state.fitted_version === state.version ? "the walls are fitted to them" : "the walls are not fitted to them yet");
-    if (state.problem) complain(state.problem);
+    // Once: what is complained of since is not to be covered.
+    if (state.problem !== known.problem) complain(known.problem = state.problem);
     measures();
     redraw();
   };
@@ -60,7 +62,7 @@ const desk = (() => {
     try {
       await take(await ask(path, body));
     } catch (error) {
-      complain(endedWords(error));
+      complain(error.message);
       redraw();
     }
   };
@@ -69,7 +71,7 @@ const desk = (() => {
     try {
       await take(await ask("/state"));
     } catch (error) {
-      complain(endedWords(error));
+      complain(error.message);
     }
     setTimeout(follow, state.fitting ? 250 : 1500);
   };
@@ -155,17 +157,17 @@ const desk = (() => {
   };
   const rounded = (at) => at.map((v) => Math.round(100 * v) / 100);
   const end = () => {
-    const { player, point, path } = drag;
+    const { player, phase, point, path } = drag;
     const chosen = point || tool === "remove" ? undefined : alongPath();
     drag = undefined;
     if (tool === "move") {
       if (point && apart(player, point.at, path.at(-1)) > 0.1) return send({ action: "move", point: point.id, to: rounded(path.at(-1)) });
     } else if (tool === "remove") {
-      const one = nearest(player, path[0], 3);
-      const ids = path.length > 3 ? points.filter((p) => here(player, p) && inside(p.at, path)).map((p) => p.id) : one ? [one.id] : [];
+      const one = nearest(player, path[0], 3), isClick = path.every((at) => apart(player, at, path[0]) < 1.5);
+      const ids = isClick ? (one ? [one.id] : []) : points.filter((p) => here(player, p, phase) && inside(p.at, path)).map((p) => p.id);
       if (ids.length) return send({ action: "remove", points: ids });
     } else {
-      return send({ action: "set", slice: player.index, phase: player.phase, surface: tool, at: chosen.map(rounded) });
+      return send({ action: "set", slice: player.index, phase, surface: tool, at: chosen.map(rounded) });
     }
     return player.draw();
   };
@@ -175,10 +177,12 @@ const desk = (() => {
     canvas.addEventListener("pointerdown", (event) => {
       if (tool === "look" || event.button !== 0) return;
       event.preventDefault();
+      player.play(false);
+      playAll(false);
       const place = at(event), point = tool === "move" ? nearest(player, place, 4) : undefined;
       if (tool === "move" && !point) return;
       if (!player.image.picture) return complain(`Slice ${player.slice.name} has no image of this phase.`);
-      drag = { player, point, path: [place] };
+      drag = { player, phase: player.phase, point, path: [place] };
       canvas.setPointerCapture(event.pointerId);
       player.draw();
     });
@@ -211,11 +215,12 @@ const desk = (() => {
     redraw();
   };
   byId("phase").addEventListener("input", () => setPhase(Number(byId("phase").value)));
-  byId("play").addEventListener("click", () => {
+  const playAll = (on) => {
     clearInterval(playing);
-    playing = playing ? undefined : setInterval(() => setPhase((Number(byId("phase").value) + 1) % (Number(byId("phase").max) + 1)), 120);
-    byId("play").textContent = playing ? "\u25a0" : "\u25b6";
-  });
+    playing = on ? setInterval(() => setPhase((Number(byId("phase").value) + 1) % (Number(byId("phase").max) + 1)), 120) : undefined;
+    byId("play").textContent = on ? "\u25a0" : "\u25b6";
+  };
+  byId("play").addEventListener("click", () => playAll(playing === undefined));
   const pick = toolBar(hints, (name) => {
     tool = name;
     drag = undefined;
@@ -236,6 +241,6 @@ const desk = (() => {
     follow();
   };
   pick("look");
-  begin().catch((error) => complain(endedWords(error)));
+  begin().catch((error) => complain(error.message));
   return { get players() { return players; }, get points() { return points; }, get state() { return state; }, get fit() { return fit; } };
 })();
