@@ -15,6 +15,7 @@
 #include "estimator/cli/solution_json.hpp"
 #include "estimator/cli/study_options.hpp"
 #include "estimator/fe/pressure_volume.hpp"
+#include "estimator/io/finding_json.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "estimator/model/affected_model.hpp"
 #include "estimator/model/study_model.hpp"
@@ -83,7 +84,7 @@ std::string to_html(const Study& study, const PressureVolumeCurve& curve) {
 }
 
 nlohmann::ordered_json to_json(const Study& study, ElasticModel& model, const PressureVolumeCurve& curve,
-                               double seconds) {
+                               const std::vector<Finding>& findings, double seconds) {
   nlohmann::ordered_json json;
   json["reason"] = Interruption::requested() ? std::string_view("interrupted") : describe(curve.last.reason);
   json["law"] = model.law().name();
@@ -103,6 +104,7 @@ nlohmann::ordered_json to_json(const Study& study, ElasticModel& model, const Pr
     json["limit_points"].push_back({DIASTOLE_NAMED(limit, volume_change_mL, pressure_kPa)});
   json["work_mJ"] = curve.work_mJ();
   add_equilibrium(json["end"], model, curve.state);
+  json["findings"] = written(findings);
   json["seconds"] = seconds;
   return json;
 }
@@ -136,7 +138,7 @@ ExitCode run_pv(const PvArguments& arguments, const CommandOutput& out) {
                             "Name the page or the table to write, for example curve.html.");
   const Study study = read_study(arguments.study);
   remark_on_imaged_load(study, "pv");
-  remark_on_model(study);
+  const std::vector<Finding> findings = remark_on_model(study);
   ElasticModel model = make_affected_model(study, with_progress("pv"));
   require_closed_cavity(study, model);
   remark_on_size(model.mesh(), "pv");
@@ -153,7 +155,7 @@ ExitCode run_pv(const PvArguments& arguments, const CommandOutput& out) {
   if (Interruption::requested())
     std::cerr << "diastole pv: interrupted; what was found until then is reported\n";
   if (out.json) {
-    std::cout << json_text(to_json(study, model, curve, seconds_since(begun)), 1) << '\n';
+    std::cout << json_text(to_json(study, model, curve, findings, seconds_since(begun)), 1) << '\n';
   } else {
     print_for_people(curve);
     for (const std::filesystem::path& output : arguments.outputs.files)

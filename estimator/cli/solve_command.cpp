@@ -21,6 +21,7 @@
 #include "estimator/cli/unloading_output.hpp"
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/point_fields.hpp"
+#include "estimator/io/finding_json.hpp"
 #include "estimator/io/measurement.hpp"
 #include "estimator/io/study.hpp"
 #include "estimator/mesh/point_locator.hpp"
@@ -270,7 +271,7 @@ ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
   const Study study = read_study(arguments.study);
   require_frames(arguments, study);
   arguments.outputs.require(study, arguments.frames);
-  remark_on_model(study);
+  const std::vector<Finding> findings = remark_on_model(study);
   SolveOptions options = with_progress("solve");
   options.check_stability = true;
   std::optional<UnloadedModel> unloaded;
@@ -295,6 +296,7 @@ ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
   nlohmann::ordered_json json = as_json(study, model, solution, probes, seconds_since(begun));
   if (unloaded) json["unloaded"] = unloading_json(*unloaded);
   if (!whole) json["reason"] = "no shape without load";
+  json["findings"] = written(findings);
   if (done) {
     arguments.outputs.write(study, model, solved);
     for (const std::filesystem::path& file : arguments.outputs.files.files)

@@ -38,7 +38,11 @@ void remark_on_imaged_load(const Study& study, std::string_view command) {
              command, study.imaged_at->pressure_kPa);
 }
 
-void remark_on_model(const Study& study) { print_findings(model_findings(study), stderr); }
+std::vector<Finding> remark_on_model(const Study& study) {
+  std::vector<Finding> findings = model_findings(study);
+  print_findings(findings, stderr);
+  return findings;
+}
 
 Study read_study(const StudyOptions& options) {
   Study study = read_study(options.study);

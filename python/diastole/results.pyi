@@ -258,6 +258,7 @@ class Solution(Record):
     pressure_unknowns: int
     unstable_motions: int
     stable: bool
+    findings: list[Finding]
     seconds: float
     probes: list[Probe]
     frames: list[SolvedFrame] | None = ...
@@ -270,6 +271,18 @@ class Forces(Record):
     supports_N: dict[str, list[float]]
     cavity_N: list[float]
     unbalanced_N: float
+
+@dataclass(frozen=True)
+class Finding(Record):
+    """Something about the data that their user should know."""
+
+    severity: str
+    id: str
+    what: str
+    where: str
+    number: float | None
+    unit: str
+    remedy: str
 
 @dataclass(frozen=True)
 class Probe(Record):
@@ -400,18 +413,6 @@ class FittedVarianceShares(Record):
     pressures: float
     fibres: float
     geometry: float
-
-@dataclass(frozen=True)
-class Finding(Record):
-    """Something about the data that their user should know."""
-
-    severity: str
-    id: str
-    what: str
-    where: str
-    number: float | None
-    unit: str
-    remedy: str
 
 @dataclass(frozen=True)
 class Exclusion(Record):

@@ -79,6 +79,17 @@ TEST_F(SolveCommand, JsonHoldsWhatTheContractSays) {
   EXPECT_NEAR(json["probes"][1]["displacement_mm"][0].get<double>(), -4.2197, 0.04);
 }
 
+TEST_F(SolveCommand, JsonHoldsWhatIsRemarkedOnTheModel) {
+  const std::vector<std::string> solve = {"--pressure-kPa", "1", "--mesh", "4,1,1", "--json"};
+  EXPECT_TRUE(nlohmann::json::parse(run(solve).output)["findings"].empty());
+  write_study(std::string(gel_study) + "[model]\neffects = [\"viscoelasticity\"]\n");
+  testing::internal::CaptureStderr();
+  const nlohmann::json findings = nlohmann::json::parse(run(solve).output)["findings"];
+  EXPECT_THAT(testing::internal::GetCapturedStderr(), testing::HasSubstr("viscoelasticity"));
+  ASSERT_EQ(findings.size(), 1U);
+  EXPECT_EQ(findings[0]["id"], "effect-of-recordings");
+}
+
 TEST_F(SolveCommand, NeedsNoData) {
   const std::string text = gel_study;
   write_study(text.substr(0, text.find("[data]")));
