@@ -85,7 +85,8 @@ void GuideDesk::read_points() {
     throw InputError({file_.string(), "", fmt::format("has {} points", known.points.size()),
                       fmt::format("The desk takes {} at most.", most_points)});
   const bool are_found = written_.empty();
-  findings_ = are_found ? cines_.findings : known.findings;
+  findings_ = cines_.findings;
+  if (!are_found) findings_.insert(findings_.end(), known.findings.begin(), known.findings.end());
   for (const std::string& name : known.slices)
     if (std::ranges::find(slices_, name) == slices_.end()) slices_.push_back(name);
   for (const int phase : known.phases)
