@@ -2,6 +2,7 @@
 //   make_seeds DIRECTORY     (makes a folder for each target in it)
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -207,7 +208,7 @@ std::string nifti_seed() {
   const auto put = [&](size_t at, auto value) { std::memcpy(header.data() + at, &value, sizeof(value)); };
   put(0, std::int32_t{348});
   size_t at = 40;
-  for (const std::int16_t size : {4, 2, 2, 2, 3, 1, 1, 1}) {
+  for (const std::int16_t size : std::array<std::int16_t, 8>{4, 2, 2, 2, 3, 1, 1, 1}) {
     put(at, size);
     at += sizeof(size);
   }
@@ -218,7 +219,7 @@ std::string nifti_seed() {
   put(108, 352.0F);
   put(112, 1.0F);
   put(254, std::int16_t{1});  // of the three rows that follow
-  for (const size_t row : {0, 1, 2})
+  for (size_t row = 0; row < 3; ++row)
     put(280 + 20 * row, 2.0F);
   header.replace(344, 3, "n+1");
   return header + std::string(4 * 2 * 2 * 2 * 3, 'A') + "\f0 1000 1000\n\f0 1 0\n0 0 1\n0 0 0\n";
