@@ -63,11 +63,13 @@ class CommandLine {
     return command;
   }
 
-  /// What the front door runs when `command` was chosen, which has all its options by now. Its numbers must be finite, and its words some.
+  /// What the front door runs when `command` was chosen, which has all its options by now. Its numbers must be finite, its words some, and none of them
+  /// the name of another option, before which a word was forgotten.
   void on_run(CLI::App* command, Action action) {
     for (CLI::Option* option : command->get_options()) {
       if (option->get_type_name().starts_with("FLOAT")) option->check(must_be_finite, "");
-      if (option->get_type_name().starts_with("TEXT")) option->check(must_be_some, "");
+      if (option->get_type_name().starts_with("TEXT"))
+        option->check([command](const std::string& text) { return must_be_some(*command, text); }, "");
     }
     command->callback([this, action = std::move(action)] { chosen_ = action; });
   }
@@ -78,7 +80,11 @@ class CommandLine {
   static std::string must_be_finite(const std::string& text) {
     return std::isfinite(number_of(text).value_or(0.0)) ? "" : text + " is not a finite number";
   }
-  static std::string must_be_some(const std::string& text) { return text.empty() ? "is empty" : ""; }
+  static std::string must_be_some(const CLI::App& command, const std::string& text) {
+    if (text.empty()) return "is empty";
+    const bool is_option = text.size() > 1 && text[0] == '-' && command.get_option_no_throw(text) != nullptr;
+    return is_option ? "has no value before " + text : "";
+  }
   CLI::App& app_;
   CommandOutput output_;
   Action chosen_;

@@ -111,6 +111,12 @@ std::vector<BadInput> table() {
        },
        2,
        {"gel.run.h5", "is a recording", "another name"}},
+      {"AnOptionWhereItsValueWasForgotten",
+       [](Place) -> std::vector<std::string> {
+         return {"diastole", "runs", ".", "-o", "--json"};
+       },
+       2,
+       {"--output", "has no value before --json", "--help"}},
       {"RunsSinceNoMonth",
        [](Place) -> std::vector<std::string> {
          return {"diastole", "runs", "since=2026-13"};
