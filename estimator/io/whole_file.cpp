@@ -33,6 +33,13 @@ bool starts_with_mark(const fs::path& path, std::string_view mark) {
   return start.find(mark) != std::string::npos;
 }
 
+bool is_written(const fs::path& file, std::string_view content) {
+  std::ofstream stream(file, std::ios::binary);
+  stream << content;
+  stream.close();
+  return static_cast<bool>(stream);
+}
+
 }  // namespace
 
 void write_whole_file(const fs::path& path, const std::function<void(const fs::path& unfinished)>& write) {
@@ -51,20 +58,15 @@ void write_whole_file(const fs::path& path, const std::function<void(const fs::p
 
 void write_whole_file(const fs::path& path, std::string_view content) {
   write_whole_file(path, [&](const fs::path& unfinished) {
-    std::ofstream stream(unfinished, std::ios::binary);
-    stream << content;
-    stream.close();
-    if (!stream) cannot_be_written(path);
+    if (!is_written(unfinished, content)) cannot_be_written(path);
   });
 }
 
 void write_durable_file(const fs::path& path, std::string_view content) {
   write_whole_file(path, [&](const fs::path& unfinished) {
-    std::ofstream stream(unfinished, std::ios::binary);
-    stream << content;
-    stream.close();
+    const bool is_whole = is_written(unfinished, content);
     const int file = ::open(unfinished.c_str(), O_RDONLY | O_CLOEXEC);
-    const bool is_kept = stream && file >= 0 && ::fsync(file) == 0;
+    const bool is_kept = is_whole && file >= 0 && ::fsync(file) == 0;
     if (file >= 0) ::close(file);
     if (!is_kept) cannot_be_written(path);
   });

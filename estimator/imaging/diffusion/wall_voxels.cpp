@@ -83,10 +83,9 @@ class VoxelGrid {
   void around(const Eigen::Vector3d& place_mm, const Found& found) const {
     for (size_t s = 0; s < series_.slices.size(); ++s) {
       const SlicePlane& plane = series_.slices[s];
-      const Eigen::Vector3d apart = place_mm - plane.origin_mm;
-      if (std::abs(apart.dot(plane.normal())) > 0.5 * series_.thickness_mm) continue;
-      const double column = apart.dot(plane.along_row) / plane.column_spacing_mm;
-      const double row = apart.dot(plane.along_column) / plane.row_spacing_mm;
+      if (std::abs(plane.across_mm(place_mm)) > 0.5 * series_.thickness_mm) continue;
+      const Eigen::Vector2d pixel = plane.pixel(place_mm);
+      const double column = pixel.x(), row = pixel.y();
       constexpr double half = 0.5 * width_px;
       for (int r = static_cast<int>(std::ceil(row - half)); r <= row + half; ++r) {
         for (int c = static_cast<int>(std::ceil(column - half)); c <= column + half; ++c) {

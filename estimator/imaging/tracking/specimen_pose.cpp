@@ -144,8 +144,7 @@ struct Ends {
 void add_ends(const TrackedSlice& slice, const Eigen::Vector3d& origin_mm, const Eigen::Vector3d& axis,
               double inner_mm, double outer_mm, Ends& ends) {
   const TagView& view = slice.view;
-  const Eigen::Vector2d start((origin_mm - view.plane.origin_mm).dot(view.plane.along_row),
-                              (origin_mm - view.plane.origin_mm).dot(view.plane.along_column));
+  const Eigen::Vector2d start = view.plane.in_plane_mm(origin_mm);
   const Eigen::Vector2d along =
       Eigen::Vector2d(axis.dot(view.plane.along_row), axis.dot(view.plane.along_column)).normalized();
   const Eigen::Vector2d across(-along.y(), along.x());

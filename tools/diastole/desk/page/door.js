@@ -24,6 +24,14 @@ const deskDoor = (() => {
   };
   const clamp = (player, [column, row]) => [Math.min(Math.max(column, -0.5), player.slice.columns - 0.5), Math.min(Math.max(row, -0.5), player.slice.rows - 0.5)];
 
+  // Whether a place lies within a closed path of places.
+  const inside = (place, path) => {
+    let odd = false;
+    for (let i = 0, j = path.length - 1; i < path.length; j = i++)
+      if ((path[i][1] > place[1]) !== (path[j][1] > place[1]) && place[0] < (path[j][0] - path[i][0]) * (place[1] - path[i][1]) / (path[j][1] - path[i][1]) + path[i][0]) odd = !odd;
+    return odd;
+  };
+
   // A button that makes a picture large; a double click does, where `mayClick` lets it.
   const sizeButton = (player, mayClick) => {
     const size = document.createElement("button");
@@ -53,5 +61,5 @@ const deskDoor = (() => {
     });
     return pick;
   };
-  return { byId, ask, complain, clamp, sizeButton, toolBar };
+  return { byId, ask, complain, clamp, inside, sizeButton, toolBar };
 })();

@@ -1,7 +1,7 @@
 // The desk of cines: guide points with handles, and the fitted ventricle's walls under them. Every change goes to the server, which has it in
 // the file before it answers; what is shown is its points.
 const desk = (() => {
-  const { byId, ask, complain, clamp, sizeButton, toolBar } = deskDoor;
+  const { byId, ask, complain, clamp, inside, sizeButton, toolBar } = deskDoor;
   const hints = {
     look: "Point at a point for what it is. Lines are the fitted walls. Double-click makes a picture large; the slider above the pictures moves them all.",
     move: "Pull a point to where this wall is seen. Then fit again.",
@@ -148,12 +148,6 @@ const desk = (() => {
     // A drawn ring ends where it began.
     if (chosen.length > 3 && apart(player, chosen[0], chosen.at(-1)) < 0.5 * apartMm) chosen.pop();
     return chosen;
-  };
-  const inside = (p, path) => {
-    let odd = false;
-    for (let i = 0, j = path.length - 1; i < path.length; j = i++)
-      if ((path[i][1] > p[1]) !== (path[j][1] > p[1]) && p[0] < (path[j][0] - path[i][0]) * (p[1] - path[i][1]) / (path[j][1] - path[i][1]) + path[i][0]) odd = !odd;
-    return odd;
   };
   const rounded = (at) => at.map((v) => Math.round(100 * v) / 100);
   const end = () => {

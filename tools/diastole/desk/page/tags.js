@@ -1,7 +1,7 @@
 // The desk: tracked slices with handles. What is drawn becomes a choice (one line of the edits file) on the server, which answers with
 // all choices that stand; what is shown is theirs.
 const desk = (() => {
-  const { byId, ask, complain, sizeButton, clamp, toolBar } = deskDoor;
+  const { byId, ask, complain, clamp, inside, sizeButton, toolBar } = deskDoor;
   const hints = {
     look: "Point at a line for its tag and its error, at a cross for why it was left out. Double-click makes a picture large.",
     line: "Pull a line to where this tag is seen; its neighbourhood comes along, with Shift the whole line. Then track again.",
@@ -76,18 +76,12 @@ const desk = (() => {
   };
 
   // ---- drawing on a picture ----
+  const pairs = (flat) => Array.from({ length: flat.length / 2 }, (_, i) => [flat[2 * i], flat[2 * i + 1]]);
   const kinds = (player) => { // the found outlines: those within another are inner
-    const inside = (p, outline) => {
-      let odd = false;
-      for (let i = 0, j = outline.length - 2; i < outline.length; j = i, i += 2)
-        if ((outline[i + 1] > p[1]) !== (outline[j + 1] > p[1]) && p[0] < (outline[j] - outline[i]) * (p[1] - outline[i + 1]) / (outline[j + 1] - outline[i + 1]) + outline[i]) odd = !odd;
-      return odd;
-    };
     const all = player.image.outlines ?? [], found = { inner: [], outer: [] };
-    for (const one of all) found[all.some((other) => other !== one && inside(one, other)) ? "inner" : "outer"].push(one);
+    for (const one of all) found[all.some((other) => other !== one && inside(one.slice(0, 2), pairs(other))) ? "inner" : "outer"].push(one);
     return found;
   };
-  const pairs = (flat) => Array.from({ length: flat.length / 2 }, (_, i) => [flat[2 * i], flat[2 * i + 1]]);
   const edge = (player, kind) => { // the one that counts: as drawn last, or the only one that was found
     const drawn = edits.filter((edit) => edit.action === "contour" && edit.contour === kind && here(player, edit)).at(-1);
     if (drawn) return drawn.points;
