@@ -14,8 +14,8 @@ Explanation explain_study(const Study& study, const ExplainOptions& options);
 // they name, is a measurement of it for the runs, so that there is one C1. An effect that shows in both is then judged by both: sets
 // that only one of them leaves open are closed by the other.
 
-/// The study as the runs see it: its modulus is known as well as the images tell it, if that is better than the study does. As it
-/// stands where the images are unexplained or ambiguous.
+/// The study as the runs see it, with the modulus as well known as the images determine it, if that is better than the study states.
+/// Unchanged where the images are unexplained or ambiguous.
 Study with_imaged_modulus(Study study, const Explanation& field);
 
 /// Effects of both; named only if both agree that nothing else is open.

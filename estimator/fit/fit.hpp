@@ -89,7 +89,7 @@ struct EstimatedFrame {
   double pressure_kPa;
   double se_kPa;  ///< 0 when exactly known
   std::optional<PressureByMotion>
-      by_motion;  ///< absent where the pressure is exactly known, or only the reading tells it
+      by_motion;  ///< absent where the pressure is exactly known, or known from the reading alone
   FoundPoints found;
   Eigen::VectorXd weighted;  ///< residuals / sigma
   Eigen::VectorXd unweighted_mm;

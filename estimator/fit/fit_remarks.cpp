@@ -17,7 +17,7 @@ constexpr double telling_correlation = 0.8;
 constexpr size_t most_pairs = 6;
 constexpr double small_share = 0.1;       // of a direction: not worth a word
 constexpr double unseen_relative_sd = 1;  // beyond this a value is known by its bounds only
-constexpr double lopsided = 5.0;          // largest over smallest standard deviation worth telling
+constexpr double lopsided = 5.0;          // largest over smallest standard deviation worth reporting
 
 /// How far chi2/dof is from 1, in its own standard deviations sqrt(2/dof).
 double deviation(double chi2_per_dof, double dof) { return (chi2_per_dof - 1) / std::sqrt(2 / dof); }
@@ -41,7 +41,7 @@ std::string remark_on_misfit(const FitRecord& record) {
   return fmt::format("The residuals spread as the stated noise says ({}).", figure);
 }
 
-/// Under a robust loss: wild residuals would dominate chi2/dof, so that only the others' core can tell.
+/// Under a robust loss: wild residuals would dominate chi2/dof, so that only the others' core is compared.
 std::string remark_on_core(const FitOutcome& fit) {
   constexpr double telling_factor = 1.2;
   std::vector<double> all;

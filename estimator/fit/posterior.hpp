@@ -10,7 +10,7 @@
 //
 // Where the posterior is normal every step is accepted, whatever the number of unknowns; beta is adapted during
 // warm-up only. Several chains start apart, and split R-hat and the effective sample size (Gelman et al., Bayesian
-// Data Analysis, 3rd ed., 11.4) tell whether they agree. Unknowns stay within their bounds.
+// Data Analysis, 3rd ed., 11.4) show whether they agree. Unknowns stay within their bounds.
 
 #include <functional>
 #include <vector>
@@ -39,7 +39,7 @@ struct PosteriorSample {
 PosteriorSample sample_posterior(JointProblem& problem, const Eigen::VectorXd& best,
                                  const Eigen::MatrixXd& covariance, const PosteriorOptions& options);
 
-/// Split R-hat of one unknown: 1 when the halves of all chains tell the same.
+/// Split R-hat of one unknown: 1 when the halves of all chains agree.
 double split_r_hat(const std::vector<Eigen::VectorXd>& chains);
 
 /// How many independent draws the chains are worth together.

@@ -4,8 +4,8 @@
 //
 //   W = integral of p dV from frame 0 to the most loaded frame  =  U(x) - U(X),     U = integral of the law's energy over the body     (mJ)
 //
-// In a model that is in equilibrium in every frame this holds by itself for the model's own volumes and pressures (virtual work). It tells
-// something where the volume was measured apart from the tags, as by phase contrast: the table that `diastole flow --loop` writes.
+// In a model that is in equilibrium in every frame this holds by itself for the model's own volumes and pressures (virtual work). It adds
+// information where the volume was measured apart from the tags, as by phase contrast: the table that `diastole flow --loop` writes.
 // Pressures that read too high by an offset o make W too large by o dV.
 //
 // W is the chords' sum over the loop's points between the two times. What a whole cycle does not return, the loop's area A, is spent on

@@ -12,7 +12,7 @@ struct DeletedResidual {
   double share;  ///< of the residual's variance that is left by the fit: 1 - leverage
 };
 
-/// `derivatives` of the residual by the unknowns, `inverse` of the normal matrix. None where only the measurement itself tells what it says.
+/// `derivatives` of the residual by the unknowns, `inverse` of the normal matrix. None where only the measurement itself says it.
 inline std::optional<DeletedResidual> deleted_residual(double residual, const Eigen::VectorXd& derivatives,
                                                        const Eigen::MatrixXd& inverse) {
   constexpr double told_by_others = 1e-6;  // less is rounding

@@ -1,5 +1,5 @@
 #pragma once
-// Tells results of one study from those of another, wherever the files lie and whatever they are called.
+// Distinguishes results of one study from those of another, wherever the files lie and whatever they are called.
 
 #include <string>
 

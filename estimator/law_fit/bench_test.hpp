@@ -1,5 +1,5 @@
 #pragma once
-// A bench test of tissue as a CSV file; its header's first column tells which (test_kinds.hpp):
+// A bench test of tissue as a CSV file; its header's first column says which (test_kinds.hpp):
 //
 //   stretch,nominal_kPa
 //   planar_stretch,nominal_kPa

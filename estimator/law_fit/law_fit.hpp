@@ -64,7 +64,7 @@ struct LawFitOptions {
 /// Precondition: `check_law` has passed.
 LawFit fit_law(const Law& law, std::span<const BenchTest> tests, const LawFitOptions& options = {});
 
-/// Throws InputError if the law has directions that a test does not tell, or more parameters than there are readings.
+/// Throws InputError if the law has directions that a test does not determine, or more parameters than there are readings.
 void check_law(const Law& law, std::span<const BenchTest> tests);
 /// The same as a sentence; empty if it can be fitted.
 std::string why_not(const Law& law, std::span<const BenchTest> tests);

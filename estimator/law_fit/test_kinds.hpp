@@ -33,7 +33,7 @@ namespace diastole {
 struct TestKind {
   std::string_view name;
   std::string_view title;  ///< for a page
-  /// What is set, then what is measured; the first one tells the kinds apart.
+  /// What is set, then what is measured; the first one distinguishes the kinds.
   std::span<const std::string_view> columns;
   size_t controls;              ///< of the columns
   size_t needed;                ///< columns that a file must have; of the rest it may lack the last ones

@@ -117,7 +117,7 @@ double above_zero(const RecordedRun& run, const char* name, double otherwise) {
   return value;
 }
 
-/// The base rig that a run describes; what it does not tell is the paper's. Throws InputError where a rig cannot be so.
+/// The base rig that a run describes; what it does not state is the paper's. Throws InputError where a rig cannot be so.
 RigModel base_model(const RecordedRun& run) {
   RigModel model;
   Hose& hose = model.hose;

@@ -21,7 +21,7 @@ namespace {
 constexpr double most_se_percent = 1e4;  // a hundred times its value: nothing is known about a parameter
 constexpr double new_frames[] = {0.25, 0.5, 0.75, 1.0, 1.25, 1.5};  // of the highest pressure so far
 
-/// What one frame tells, its pressure not yet eliminated. "Values" are the parameters', and last the pressure of an image under load that is
+/// The information of one frame, its pressure not yet eliminated. "Values" are the parameters', and last the pressure of an image under load that is
 /// not exactly known.
 struct FrameInformation {
   int number;

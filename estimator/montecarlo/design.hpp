@@ -1,5 +1,5 @@
 #pragma once
-// Which change of an experiment would tell its parameters best, before it is done: the Fisher information of each
+// Which change of an experiment would determine its parameters best, before it is done: the Fisher information of each
 // frame at the parameters' present values, by the exact sensitivities.
 //
 //   I_f = J_f' J_f over (values, P_f),  J_f the weighted residuals' derivatives;  P_f adds 1/sigma_f² to its own entry;

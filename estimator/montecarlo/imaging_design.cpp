@@ -26,7 +26,7 @@ using Eigen::Vector3d;
 constexpr double apart_in_spacings = 0.8;
 constexpr double sure_in_pixels = 1.25;
 constexpr double most_sigma_in_spacings = 0.5;   // a line that is known no better is lost
-constexpr double least_spacing_in_pixels = 3.0;  // finer tags are not told from their mirror images
+constexpr double least_spacing_in_pixels = 3.0;  // finer tags look like their mirror images
 constexpr size_t fewest_points = 30;
 
 /// A slice through the specimen's origin or across its axis.

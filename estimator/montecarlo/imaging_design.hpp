@@ -1,8 +1,8 @@
 #pragma once
-// Which tagged images would tell a study's parameters best, before the magnet is booked.
+// Which tagged images would determine a study's parameters best, before the magnet is booked.
 //
 // A tag of modulation m(t) = exp(-t / T1) is seen as brightness 1 - m (1 + cos phi) / 2, phi = 2 pi w / spacing + ..., in noise of 1 / snr
-// in each pixel. Its slope by the motion w is (pi m / spacing) sin phi, so that an area A of tissue tells
+// in each pixel. Its slope by the motion w is (pi m / spacing) sin phi, so that an area A of tissue gives
 //
 //   1 / sigma^2 = (pi m snr / spacing)^2 / 2 * A / pixel^2                                                (1/mm^2)
 //
@@ -26,7 +26,7 @@ struct ImagingPlan {
 };
 
 /// The tag points that the plan sees of the undeformed body in each loaded frame, each with its own error in that frame.
-/// Tissue nearer than a pixel and a quarter to an edge tells nothing: it shares its pixels.
+/// Tissue nearer than a pixel and a quarter to an edge gives nothing: it shares its pixels.
 Measurement planned_tags(const HermiteMesh& mesh, const ImagingPlan& plan, const std::vector<Frame>& frames);
 
 /// Predicted standard errors at the study's start values, and what changes of the plan would make them. Frames: the study's, with

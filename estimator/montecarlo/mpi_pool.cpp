@@ -42,7 +42,7 @@ class Coordinator {
     take_(job, result);
   }
 
-  /// Until every other rank has been told that there is no more.
+  /// Until every other rank has received the message that there is no more.
   void serve(int others) {
     while (others > 0) {
       int waiting = 0;

@@ -9,7 +9,7 @@
 // misplaced in all of them alike. Slices are taken up one by one, the most significant first, the others then judged
 // beside those found, because the field bends its neighbours' residuals as well.
 //
-// Offsets along n of all slices that a rigid shift of the body would make alike cannot be seen; none is invented. An offset is told by
+// Offsets along n of all slices that a rigid shift of the body would make alike cannot be seen; none is invented. An offset is determined by
 // what the field leaves of it, the share S / C'C: a field that takes up nearly all of it leaves the mesh's error and unfinished rounds,
 // and dividing these by a small S would make a large offset of them.
 

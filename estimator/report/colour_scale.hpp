@@ -18,7 +18,7 @@ std::array<double, 2> colour_range(const std::vector<double>& values);
 /// blue - white - red at 0..1, for signed values.
 std::string signed_colour(double fraction);
 
-/// Values in colours, in so many steps as cannot be told apart.
+/// Values in colours, in so many steps that neighbours look alike.
 struct ColourScale {
   std::array<double, 2> range;
   std::string (*colour)(double fraction) = map_colour;

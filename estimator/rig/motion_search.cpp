@@ -206,7 +206,7 @@ std::vector<Stroke> coarse_strokes(const Counted& counted) {
   return strokes;
 }
 
-/// A stretch of time of which one segment of the table tells.
+/// A stretch of time that one segment of the table describes.
 struct Stretch {
   Segment segment;
   bool named = false;  ///< its waveform's cycle is known; else what lies between such segments

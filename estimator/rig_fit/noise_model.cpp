@@ -156,7 +156,7 @@ struct Roughness {
 };
 
 ChannelNoise channel_noise(const Session& session, Channel channel) {
-  constexpr double enough = 300.0;         // samples at rest that tell the noise's colour
+  constexpr double enough = 300.0;         // samples at rest that show the noise's colour
   constexpr double not_noise_alone = 2.0;  // slowness of cycles' difference over that at rest
   Autocovariance covariance;
   Roughness whole, still;

@@ -17,7 +17,7 @@ namespace {
 constexpr size_t most_harmonics = 30;
 constexpr size_t first_harmonics = 8;
 constexpr size_t most_cosines = 120;
-constexpr double most_groups = 48.0;  ///< of cycles whose levels are told apart
+constexpr double most_groups = 48.0;  ///< of cycles whose levels are distinguished
 constexpr double least_s = 0.5;       ///< shorter windows show nothing
 constexpr double forever = std::numeric_limits<double>::infinity();
 constexpr double independent = 1e-4;  ///< of a function's square that earlier ones do not hold

@@ -20,7 +20,7 @@ struct TolerancePrior {
 };
 
 /// Effects with their values, and the nuisances: modulus, sensors' offsets, tolerances, each N(0, 1) by its prior. Where a
-/// reference has told more of the tolerances, theirs are independent combinations of them.
+/// reference says more of the tolerances, theirs are independent combinations of them.
 struct SessionModel {
   std::vector<ModelTerm> terms;
   std::vector<double> values;  ///< of the effects, natural

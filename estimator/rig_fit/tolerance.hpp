@@ -1,5 +1,5 @@
 #pragma once
-// What a rig's description does not tell exactly: lengths, losses, lags, gains, a gel's few per cent of relaxation.
+// What a rig's description does not state exactly: lengths, losses, lags, gains, a gel's few per cent of relaxation.
 //
 // Each is an unknown of every fit, with a prior: its offset from what /rig states is normal about zero with the sd of
 // the list in tolerance.cpp, whose sizes are those of the parts' data sheets and of the labs' own rigs. An effect is a
@@ -17,8 +17,8 @@ namespace diastole::rig {
 /// mends.
 enum class IsUnknown {
   always,
-  with_references,  ///< whatever they tell of it
-  where_learnt      ///< where they tell more of it than the list
+  with_references,  ///< whatever they say of it
+  where_learnt      ///< where they say more of it than the list
 };
 
 struct Tolerance {

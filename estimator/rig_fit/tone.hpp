@@ -4,7 +4,7 @@
 // Features (segment_features.hpp) see what follows the cycle, up to some hertz; a tone of its own frequency counts there as noise. Here each
 // segment of equal cycles but the first is a window. Its periodogram, without the bins that a periodic motion fills, is compared with the median
 // of the bins around: where there is noise alone the ratio is nearly an exponential variable, and at one frequency those of all windows add up to a
-// gamma variable (Welch 1967). A tone at a harmonic of a window's cycle cannot be told from the motion there, and one beside it is seen in part: its
+// gamma variable (Welch 1967). A tone at a harmonic of a window's cycle cannot be separated from the motion there, and one beside it is seen in part: its
 // size is at least what is found, and its frequency known to some bins. Of the pump's pressure nothing is said: the hose rings there.
 
 #include <optional>

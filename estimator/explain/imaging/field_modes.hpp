@@ -8,8 +8,8 @@
 //   motion      the displacement itself differs by such harmonics along r, theta, z
 //
 // Plates, pose and body force come in two courses: in proportion to the load, and constant from the first loaded frame on.
-// All but the last two are exact responses of the elastic body. They serve to find structure that is left, to tell where it
-// is, and to rival the library: what a turned plate explains better than any effect does is not that effect.
+// All but the last two are exact responses of the elastic body. They serve to find structure that is left, to locate
+// it, and to rival the library: what a turned plate explains better than any effect does is not that effect.
 
 #include <Eigen/Dense>
 #include <string>

@@ -23,7 +23,7 @@ struct ImagedModel {
   double volume_change_mL;
 };
 
-/// For models that the images cannot tell apart: the least change of the acquisition by which the least distinguishable pair
+/// For models that the images cannot distinguish: the least change of the acquisition by which the least distinguishable pair
 /// parts by five sigmas, or else the best. Nothing for fewer than two.
 std::optional<NextExperiment> separating_images(const FieldCase& field, const MotionResiduals& rows,
                                                 const std::vector<ImagedModel>& competing);

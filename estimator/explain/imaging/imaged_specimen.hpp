@@ -14,7 +14,7 @@
 
 namespace diastole::explain {
 
-/// Told what is being done; whatever it throws ends the work.
+/// Called with what is being done; whatever it throws ends the work.
 using FieldProgress = std::function<void(const std::string&)>;
 
 class ImagedSpecimen {

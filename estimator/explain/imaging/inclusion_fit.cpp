@@ -22,7 +22,7 @@ using inference::SearchResult;
 constexpr auto parameters = static_cast<Index>(inclusion_parameters);
 
 constexpr double usual_axis_mm = 10.0;
-// Weak priors, of the logarithms: few data tell size from contrast.
+// Weak priors, of the logarithms: few data distinguish size from contrast.
 constexpr double axis_spread = 0.35;
 constexpr double contrast_spread = 1.0;
 constexpr Index priors = 4;

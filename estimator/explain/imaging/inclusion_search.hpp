@@ -12,10 +12,10 @@ namespace diastole::explain {
 struct InclusionGuess {
   Inclusion inclusion;
   double gain = 0.0;     ///< of chi2
-  double p_value = 1.0;  ///< corrected for the number of places that can be told apart
+  double p_value = 1.0;  ///< corrected for the number of distinguishable places
 };
 
-/// How many inclusions of a usual size a wall has room for: places that can be told apart.
+/// How many inclusions of a usual size a wall has room for: distinguishable places.
 double distinct_places(double volume_mm3);
 double wall_volume_mm3(const FieldModel& body);
 

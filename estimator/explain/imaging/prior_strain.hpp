@@ -1,5 +1,5 @@
 #pragma once
-// How far what a fit was told beforehand - readings of pressures, C1, the inner radius, tolerances - is from what all else says of it: by
+// How far a fit's prior values - readings of pressures, C1, the inner radius, tolerances - are from what all else says of them: by
 // deleted residuals (estimator/inference/deleted_residual.hpp). A prior that is stated as surer than it
 // is pulls the motion to itself and keeps a small residual; its deleted one shows it.
 
@@ -11,9 +11,9 @@ namespace diastole::explain {
 
 struct PriorStrain {
   double chi_square = 0.0;  ///< by which chi2 falls if all are left out
-  double degrees = 0.0;     ///< combinations of them that the motion tells, too
+  double degrees = 0.0;     ///< combinations of them that the motion determines, too
   Eigen::VectorXd
-      deleted;  ///< each one's residual if it alone is left out, in its own sds; 0 where only it tells
+      deleted;  ///< each one's residual if it alone is left out, in its own sds; 0 if it is the only source
   Eigen::VectorXd off;  ///< that in sds of it and of what the rest says, together
 };
 PriorStrain prior_strain(const FieldFit& fit);

@@ -42,7 +42,7 @@ std::vector<Variant> variants_of(const Effect& effect) {
 
 constexpr double smaller = 0.25;  ///< of the smallest of them
 constexpr double alike = 0.9;     ///< cosine
-constexpr double visible = 3.0;   ///< sds in all: less cannot be told from nothing
+constexpr double visible = 3.0;   ///< sds in all: less is indistinguishable from nothing
 constexpr size_t halvings_everywhere = 2;
 constexpr size_t most_halvings = 6;
 constexpr size_t likely_intervals = 3;  ///< of a variant, that are halved further

@@ -293,7 +293,7 @@ void SetSearch::fit_from_better_part(const std::vector<size_t>& responses) {
 }
 
 /// An effect with moments beside a set. How many there are, and when, shows as finely as the model is right, which the fit with some
-/// of them tells: they are sought under what the set leaves, under what is stated if that is finer, and again under what is left with
+/// of them shows: they are sought under what the set leaves, under what is stated if that is finer, and again under what is left with
 /// the best ones.
 void SetSearch::fit_events(const EffectSet& beside, const Effect& effect) {
   EffectSet before = beside;
@@ -360,7 +360,7 @@ void SetSearch::fit_synergies() {
 }
 
 /// Is more than half of what an effect changes what a tolerance changes that is so far off in a set that the effect may be the more
-/// probable of both? What the two leave of each other no linear algebra tells: their curvature is more.
+/// probable of both? What the two leave of each other no linear algebra shows: their curvature is more.
 bool SetSearch::relieves(const Effect* effect, const EffectSet& set) const {
   const VectorXd weight = set.evidence.variance.cwiseSqrt().cwiseInverse();
   const Index tolerances = set.model.u.size() - static_cast<Index>(rig::basic_nuisances);
@@ -453,7 +453,7 @@ bool SetSearch::is_plain_near() const {
   return best == nullptr || best_of(0)->log_posterior >= best->log_posterior - second_in_reach;
 }
 
-/// May it come near once its tolerances are not linear? At the best set's tolerances, linear algebra tells. Without effects a search
+/// May it come near once its tolerances are not linear? At the best set's tolerances, linear algebra shows it. Without effects a search
 /// goes a long way after what tolerances cannot make.
 bool SetSearch::is_plain_in_reach() const {
   if (is_plain_near()) return true;

@@ -194,7 +194,7 @@ EffectCheck EffectTrial::found_again() const {
   const EffectSet found = fitted_with(problem);
   const double off = std::abs(found.model.values[0] - options.values[0]);
   const bool is_near = off <= 5.0 * found.errors[0] + 0.02 * std::abs(options.values[0]);
-  // Parameters that these data cannot tell apart may lie anywhere, if together they do what the hidden ones do, or if these
+  // Parameters that these data cannot distinguish may lie anywhere, if together they do what the hidden ones do, or if these
   // data are as likely with them: a bubble that a softer specimen stands for as well.
   const rig::Prediction hidden = shown(options.values);
   const double differs = distance_kPa(shown(found.model.values), hidden) / distance_kPa(shown({}), hidden);

@@ -1,5 +1,5 @@
 #pragma once
-// What a segment, if it were run, would tell about competing models: predictions, their derivatives, and the sums of
+// What a segment, if it were run, would show about competing models: predictions, their derivatives, and the sums of
 // squares that a linearised refit needs.
 //
 // Of two models A and B the segment's whitened residuals, if A is true, are r = W (y_A - y_B); B's unknowns adapt by

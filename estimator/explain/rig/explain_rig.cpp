@@ -76,7 +76,7 @@ std::optional<NextExperiment> next_experiment(const Study& study, const rig::Ses
     return found.where.empty() ? std::nullopt : exposing_experiment(design, found.where.front());
   const EffectSet& chosen = search.sets[verdict.chosen];
   if (found.verdict == Verdict::named) return sharpening_experiment(design, fitted_model(problem, chosen));
-  // Ambiguous sets are told apart, a hint from nothing.
+  // Ambiguous sets are separated from each other, a hint from nothing.
   std::vector<FittedModel> models{fitted_model(problem, chosen)};
   std::set<std::vector<std::string>> told{chosen.ids()};
   for (const EffectSet& set : search.sets) {

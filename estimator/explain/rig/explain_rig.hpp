@@ -2,8 +2,8 @@
 // `diastole explain` for the runs of a rig: where the rig's model and the recordings disagree, what is missing, and
 // what remains open.
 //
-//   read the session -> features of its segments (rig_fit) -> what the rig's references tell of its tolerances and of the
-//   model's own error -> evidence of sets of effects (effect_sets) -> verdict (set_verdict) -> what people are told (findings)
+//   read the session -> features of its segments (rig_fit) -> what the rig's references say of its tolerances and of the
+//   model's own error -> evidence of sets of effects (effect_sets) -> verdict (set_verdict) -> what is reported (findings)
 
 #include <functional>
 #include <string>

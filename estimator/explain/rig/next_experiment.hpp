@@ -1,5 +1,5 @@
 #pragma once
-// Which experiment to run next, from a lattice of what the rig can do (estimator/explain/verdict/experiment_plan.hpp) and what each would tell
+// Which experiment to run next, from a lattice of what the rig can do (estimator/explain/verdict/experiment_plan.hpp) and what each would show
 // (experiment_outlook.hpp): up to three segments in one file, with the equipment that the session had; with a
 // transducer at the pump end, gated volumes, an image at rest or a shear test in addition only where nothing else
 // separates.
@@ -19,7 +19,7 @@ struct ExperimentDesign {
   SpecimenKnowledge knowledge = {};
 };
 
-/// For an ambiguous verdict: what tells the fitted models apart best, judged by its least distinguishable pair, whichever of
+/// For an ambiguous verdict: what separates the fitted models best, judged by its least distinguishable pair, whichever of
 /// the two is true. Of more than three the first three are judged. Nothing for fewer than two, or if the limits allow
 /// no segment.
 std::optional<NextExperiment> separating_experiment(const ExperimentDesign& design,

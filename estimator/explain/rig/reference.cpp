@@ -254,7 +254,7 @@ Reference learn_reference(const std::vector<Study>& studies, size_t threads,
 }
 
 std::vector<std::string_view> learnt_tolerances(const Reference& reference) {
-  constexpr double by_half = 0.5;  // of a variance of one before: as much is told again
+  constexpr double by_half = 0.5;  // of a variance of one before: as much again is learnt
   std::vector<std::string_view> names;
   for (const rig::Tolerance& tolerance : rig::all_tolerances()) {
     if (tolerance.is_unknown == rig::IsUnknown::always) continue;

@@ -48,7 +48,7 @@ void require_rig_of(const Reference& reference, const rig::Session& session, con
 Reference learn_reference(const std::vector<Study>& studies, size_t threads,
                           const std::function<void(std::string_view)>& progress = {});
 
-/// Of the tolerances that only references teach, those of which this one tells more than their list does: its part of the
+/// Of the tolerances that only references teach, those of which this one says more than their list does: its part of the
 /// information is the larger one.
 std::vector<std::string_view> learnt_tolerances(const Reference& reference);
 

@@ -18,7 +18,7 @@ using Eigen::VectorXd;
 using Ids = std::vector<std::string>;
 
 constexpr double name_probability = 0.9;
-constexpr double least_probability = 0.05;     ///< of a set that is told of
+constexpr double least_probability = 0.05;     ///< of a set that is reported
 constexpr double irregular_by_chance = 0.001;  ///< that equal cycles differ by more than noise makes them
 
 struct Sizes {
@@ -47,7 +47,7 @@ VectorXd error_squares(const rig::ModelError& error, const rig::Shares& shares) 
 }
 
 /// Do parts of the declared rig that are less than a surprise off, in all, make the same change? What modulus and offsets make
-/// of it, all but `beyond` of them, tells nothing.
+/// of it, all but `beyond` of them, carries no information.
 bool is_tolerance(const rig::SessionProblem& problem, const EffectSet& set, const VectorXd& change,
                   const VectorXd& beyond) {
   const rig::TolerancePrior& prior = problem.prior(set.model);

@@ -12,7 +12,7 @@
 
 namespace diastole::explain {
 
-/// named: exactly one set of effects survives. ambiguous: these data cannot tell several sets apart. unexplained: the
+/// named: exactly one set of effects survives. ambiguous: these data cannot distinguish several sets. unexplained: the
 /// misfit has structure that no known effect removes; `effects` is then empty, but for what the images of the same study name. none: nothing exceeds the model's own error.
 enum class Verdict { named, ambiguous, unexplained, none };
 std::string_view name_of(Verdict verdict);
@@ -192,7 +192,7 @@ struct LearnedTerm {
   double held_out_gain = 0.0;          ///< ln of the mean likelihood ratio there
   std::vector<std::string> readings;   ///< what it looks like, in words: suggestions
   std::vector<ParameterShift> shifts;  ///< C1 and offsets without it and with it
-  std::vector<LearnedRival> rivals;    ///< that these waveforms cannot tell from it
+  std::vector<LearnedRival> rivals;    ///< that these waveforms cannot distinguish from it
   std::string effect_file;             ///< beside the JSON
   std::string toml;                    ///< the file's text
 };

@@ -19,7 +19,7 @@ namespace {
 constexpr double contradicted_share = 0.75;
 /// Below, the voxels' anisotropy is noise, which agrees by about one over the voxels at a depth.
 constexpr double least_agreement = 0.05;
-/// Candidates nearer than this to the best are told apart by the helix's hand alone.
+/// Candidates nearer than this to the best are distinguished by the helix's hand alone.
 constexpr double alike_share = 0.93;
 /// Agreement over the part of deviators that is not noise: 0.85 to 0.98 of the right tables of nine labelled ventricles, 0.54 or less of the
 /// best candidates where none was right. Halfway.
@@ -80,7 +80,7 @@ std::vector<AxisCandidate> read_along(const Eigen::Matrix3d& frame, const Eigen:
   return all;
 }
 
-/// Those that no tensor tells from one that is there, half a turn about an axis or a few degrees from it, are left out.
+/// Those that no tensor distinguishes from one that is there, half a turn about an axis or a few degrees from it, are left out.
 void add_others(std::vector<AxisCandidate>& candidates, const std::vector<AxisCandidate>& others) {
   for (const AxisCandidate& other : others) {
     const bool known = std::any_of(candidates.begin(), candidates.end(), [&](const auto& candidate) {

@@ -5,7 +5,7 @@
 // A ventricle's own field must not look like it. Helix angles that differ between the septum and the free wall by 2a degrees are, over all of the
 // circumference, a rotation of a degrees across the long axis. So each twelfth of the circumference has a helix of its own, and only that
 // fibres leave the wall is left as evidence: outwards on one side and inwards on the other, which no wall's fibres do. A rotation about the
-// long axis is a transverse angle that is the same everywhere, and is not told apart from one.
+// long axis is a transverse angle that is the same everywhere, and is not distinguished from one.
 
 #include <Eigen/Dense>
 #include <string>

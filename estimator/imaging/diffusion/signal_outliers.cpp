@@ -188,7 +188,7 @@ SliceOutliers outliers_of(const DiffusionSeries& series, size_t slice, const std
   return of_slice;
 }
 
-/// Of b values whose images a tensor does not explain as a whole, in most slices that tell.
+/// Of b values whose images a tensor does not explain as a whole, in most slices that show it.
 void add_shell_findings(DiffusionSeries& series, const std::vector<SliceOutliers>& slices) {
   std::map<double, std::vector<double>> gains;
   for (const SliceOutliers& slice : slices)

@@ -21,7 +21,7 @@ constexpr int clear_px = 6;
 constexpr double least_radius_px = 2.5;
 /// From phase to phase the velocity may change by this share of half a turn before its turns are a guess by time alone.
 constexpr double sure_step = 0.75;
-/// Chi-square by which another turn must be worse where time alone does not tell: odds of one in a hundred.
+/// Chi-square by which another turn must be worse where time alone does not decide: odds of one in a hundred.
 constexpr double sure_margin = 9.2;
 
 /// Uncorrected backgrounds of 12 scanners were 0.4 to 4.9 cm/s (J. Cardiovasc. Magn. Reson. 12 (2010) 5).
@@ -104,7 +104,7 @@ LumenScene first_scene(const SlicePlane& plane, const MotionMap& map, const Movi
       bright[k] += static_cast<double>(magnitude[static_cast<size_t>(k)](at.y(), at.x())) /
                    static_cast<double>(core.size());
   }
-  // Ridged by a tenth of the brightness at a radian: few phases, or all of one speed, do not tell three numbers.
+  // Ridged by a tenth of the brightness at a radian: few phases, or all of one speed, do not determine three numbers.
   Eigen::Matrix3d normal = rows.transpose() * rows;
   normal.diagonal().tail<2>().array() += 1e-3 * static_cast<double>(count);
   scene.brightness.fluid = normal.ldlt().solve(rows.transpose() * bright);
@@ -161,8 +161,8 @@ std::vector<double> gaps_of(const PhaseContrast& scan) {
   return steps;
 }
 
-/// Whole turns are told by the course over the cycle or by the profile across the lumen, which goes to zero at the wall; and the images must look as the
-/// fit says.
+/// Whole turns follow from the course over the cycle or from the profile across the lumen, which goes to zero at the wall; and the images must look as
+/// the fit says.
 void require_known_turns(const FlowMeasurement& flow, const std::string& folder) {
   constexpr double half_turn = std::numbers::pi;
   const double cm_s = flow.scan.cm_s_per_radian();
@@ -191,7 +191,7 @@ void require_known_turns(const FlowMeasurement& flow, const std::string& folder)
 }
 
 /// Sigmas are the curvature of chi-square where it is least, times its root per degree of freedom: of a fit that has ended elsewhere they mean nothing.
-/// And whole turns are told by what velocities look like: by nothing where the fit does not explain them.
+/// And whole turns are recognised by what velocities look like: by nothing where the fit does not explain them.
 void require_trustworthy(const FlowMeasurement& flow, const std::string& folder) {
   const bool may_wrap = std::ranges::any_of(flow.lumen.core_cm_s, [&](double core_cm_s) {
     return std::abs(core_cm_s) > 0.5 * flow.scan.venc_cm_s;

@@ -49,7 +49,7 @@ struct FlowMeasurement {
   [[nodiscard]] ValueWithError volume_at(double time_s) const;
 };
 
-/// Throws InputError with a remedy if no lumen is found or its turns cannot be told.
+/// Throws InputError with a remedy if no lumen is found or its turns cannot be determined.
 FlowMeasurement measure_flow(PhaseContrast scan, const FlowRequest& request, const std::string& folder);
 
 }  // namespace diastole::imaging

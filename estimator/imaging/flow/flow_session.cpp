@@ -68,7 +68,7 @@ FlowSession measure_session(const FlowSessionRequest& request, const Stage& stag
   };
   FlowSession session;
   session.folder = request.folder.string();
-  // A run that cannot be read is told before the images are.
+  // A run that cannot be read is reported before the images are read.
   std::optional<runfile::RunFile> run;
   if (request.run) run = runfile::open_run(*request.run);
   std::optional<runfile::RecordedRun> tables;

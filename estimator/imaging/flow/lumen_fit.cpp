@@ -505,7 +505,7 @@ LumenFit fitted(const LumenData& data, const LumenStart& start, Encoding encodin
   put_turns_right();
   if (fitter.let_move_if_it_does()) {
     converged = fitter.run();
-    // Of a lumen that is out of its place the profile tells no turns.
+    // Of a lumen that is out of its place the profile determines no turns.
     put_turns_right();
   }
   LumenFit fit = fitter.result();

@@ -38,7 +38,7 @@ struct LumenFit {
   std::vector<double> core_cm_s;  ///< the fastest of each phase's profile
   Eigen::VectorXd flow_mL_s;
   Eigen::MatrixXd covariance;  ///< of the flow: noise and what the scene is uncertain by
-  /// Chi-square of the best fit with a turn more or less of the core over this one's, in units of its own; small where the images do not tell the turn.
+  /// Chi-square of the best fit with a turn more or less of the core over this one's, in units of its own; small where the images do not fix the turn.
   std::vector<double> turn_margin;
 
   /// Of images that the scene explains: what it does not hold has less than half of the noise's variance. Labelled tubes leave 0.98 to 1.03,

@@ -91,7 +91,7 @@ MotionMap motion_map(const PhaseContrast& scan) {
 Eigen::Vector2d measured_share(const PhaseContrast& scan, const MotionMap& map,
                                const Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic>& still) {
   constexpr int lags = 3;
-  // So many pairs tell a correlation to a hundredth.
+  // So many pairs determine a correlation to a hundredth.
   constexpr double least_pairs = 1e4;
   Eigen::Vector2d shares(1, 1);
   const Eigen::Index rows = still.rows(), columns = still.cols();

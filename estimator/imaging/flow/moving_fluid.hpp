@@ -36,7 +36,7 @@ double within_half_turn(double radians);
 MotionMap motion_map(const PhaseContrast& scan);
 
 /// The share of the spectrum's lines that was measured, along rows and along columns: what a scanner fills up with zeros leaves its noise alike
-/// between neighbours, at a distance of n pixels by sinc(n share). 1 where there is too little still material to tell.
+/// between neighbours, at a distance of n pixels by sinc(n share). 1 where there is too little still material to measure it.
 Eigen::Vector2d measured_share(const PhaseContrast& scan, const MotionMap& map,
                                const Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic>& still);
 

@@ -13,7 +13,7 @@
 namespace diastole::imaging {
 namespace {
 
-/// With fewer a cycle's course cannot be told from its samples.
+/// With fewer a cycle's course cannot be recovered from its samples.
 constexpr size_t least_phases = 6;
 /// Times of a phase in two series: scanners write the measured interval of each.
 constexpr double same_time_steps = 0.25;

@@ -11,7 +11,7 @@
 //
 // Breath holds: short-axis slices may be displaced in their planes, the same in all phases, by amounts whose variance is
 // estimated, too. Long-axis slices define the reference; without two of them the mean displacement is not known and is zero.
-// A slice whose points make no plane is not displaced, which is told.
+// A slice whose points make no plane is not displaced, which is reported.
 //
 // Points farther than three sigmas from their wall pull with constant force (Huber), those beyond five are named; those that no
 // ventricle passes are left out before (wild_points.hpp).

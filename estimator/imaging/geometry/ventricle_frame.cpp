@@ -105,7 +105,7 @@ VentricleFrame ventricle_frame(const GuidePoints& guide, const std::vector<Guide
     all.add(point.place_mm);
     if (point.surface != GuideSurface::base) ++count[is_inner(point.surface) ? 0 : 1];
   }
-  // Six numbers make an ellipsoid of revolution with its axis; twice that is the least that tells its errors.
+  // Six numbers make an ellipsoid of revolution with its axis; twice that is the least that shows its errors.
   constexpr size_t least = 12;
   for (size_t wall = 0; wall < 2; ++wall) {
     if (count[wall] >= least) continue;

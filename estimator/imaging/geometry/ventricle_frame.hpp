@@ -15,7 +15,7 @@ struct VentricleFrame {
   double inner_lambda = 0, outer_lambda = 0;  ///< of the two ellipsoids
 };
 
-/// Throws InputError when points of a wall are too few, or do not tell apex from base.
+/// Throws InputError when points of a wall are too few, or do not distinguish apex from base.
 VentricleFrame ventricle_frame(const GuidePoints& guide, const std::vector<GuideSlice>& slices);
 
 }  // namespace diastole::imaging

@@ -101,7 +101,7 @@ class Sorter {
  private:
   const ImageHeader& header(size_t image) const { return folder_.images[image].header; }
 
-  /// As ImageFolder's; of a file that cannot be decoded it is told, and blank images stand in its place. From several threads.
+  /// As ImageFolder's; a file that cannot be decoded is reported, and blank images stand in its place. From several threads.
   std::vector<Image> pixels(const std::vector<size_t>& images) {
     try {
       return folder_.pixels(images);
@@ -143,7 +143,7 @@ class Sorter {
       const ImageHeader& here = header(image);
       const ImageHeader& there = header(one->second);
       const bool is_copy = here.trigger_ms == there.trigger_ms && same_place(here.plane, there.plane);
-      if (is_copy) continue;  // told with slice or series
+      if (is_copy) continue;  // reported with slice or series
       if (!equal) equal = {image, one->second};
       count += 1;
     }
@@ -363,7 +363,7 @@ class Sorter {
   struct Copy {
     size_t image, of;
   };
-  /// A folder that was copied into itself is one thing to tell.
+  /// A folder that was copied into itself is one thing to report.
   void report_copies(const std::vector<Copy>& copies) {
     if (copies.empty()) return;
     const std::string others =
@@ -517,7 +517,7 @@ class Sorter {
     const auto time_ms = [&](size_t phase) { return header(slice.images[phase]).trigger_ms.value_or(0); };
     for (const PhaseOrder::LeftOut& out : order.left_out) {
       const size_t image = slice.images[out.phase];
-      if (damaged_.contains(folder_.images[image].file)) continue;  // that is told
+      if (damaged_.contains(folder_.images[image].file)) continue;  // already reported
       complain(Severity::warning, out.same_as ? "phase-copied" : "phase-unlike",
                out.same_as ? fmt::format("the image at {:.0f} ms has the pixels of {}", time_ms(out.phase),
                                          folder_.file_name(slice.images[*out.same_as]))
@@ -633,7 +633,7 @@ class Sorter {
   ImageFolder& folder_;
   std::mutex damaging_;
   std::set<size_t> damaged_;  // files
-  std::set<long> late_;       // first times that are told, in steps that trigger times can differ by
+  std::set<long> late_;       // first times that are reported, in steps that trigger times can differ by
 };
 
 }  // namespace

@@ -1,5 +1,5 @@
 #pragma once
-// A study file to complete: what the images tell is filled in, the rest is marked.
+// A study file to complete: what the images show is filled in, the rest is marked.
 
 #include <filesystem>
 #include <string>

@@ -14,7 +14,7 @@ namespace {
 constexpr double least_prominence = 50.0;
 /// Tags of a tenth of full modulation are gone from sight in noise of a twentieth of the signal.
 constexpr double least_modulation = 0.1;
-/// A spacing needs two pixels to be seen at all, and some more to be told from its mirror image.
+/// A spacing needs two pixels to be seen at all, and some more to be distinguished from its mirror image.
 constexpr double least_pixels_a_period = 2.5;
 /// Fewer periods than this across the image are shading or the object itself.
 constexpr double least_periods = 6.0;

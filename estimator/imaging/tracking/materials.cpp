@@ -306,7 +306,7 @@ RestPatterns::RestPatterns(const TagView& view, const std::vector<TagWave>& wave
 }
 
 MaterialMap first_materials(const TagView& view) {
-  // Six phases over the cycle tell three rates of fading apart.
+  // Six phases over the cycle distinguish three rates of fading.
   std::vector<size_t> chosen;
   const size_t phases = view.images.size();
   for (size_t i = 0; i < std::min<size_t>(6, phases); ++i)

@@ -1,6 +1,6 @@
 #pragma once
-// Which pixels are tissue, in each phase: told from still water, from water that mixes and from nothing by how tags fade and how bright
-// each of them is.
+// Which pixels are tissue, in each phase: distinguished from still water, from water that mixes and from nothing by how tags fade and
+// how bright each of them is.
 
 #include <Eigen/Dense>
 #include <cstdint>

@@ -9,7 +9,7 @@ namespace {
 /// A step of expectation maximisation that raises the log evidence by less has found nothing more.
 constexpr double settled_gain = 0.01;
 constexpr int most_steps = 1000;
-/// The ranges are told apart long before.
+/// The ranges are distinguished long before.
 constexpr int steps_to_choose = 12;
 /// What the images know less of than a hundredth of what the prior says of a millimetre teaches nothing.
 constexpr double least_strength = 0.01;

@@ -18,7 +18,7 @@ namespace {
 
 constexpr double two_pi = 2 * std::numbers::pi;
 
-/// Tags sample the motion once a spacing, and so tell waves of two spacings and longer: half of them is one.
+/// Tags sample the motion once a spacing, and so resolve waves of two spacings and longer: half of them is one.
 constexpr double knots_in_spacings = 2.0;
 /// Brightness varies over a tag spacing, not within it: there it is the tags' own.
 constexpr double window_in_spacings = 1.0;
