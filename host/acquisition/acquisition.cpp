@@ -166,7 +166,7 @@ class Acquisition {
     outcome_.counts.last_kPa = block_.value_kPa[block_.value_kPa.size() - channels];
     if (block_.host_ns.back() - block_.host_ns.front() >= block_span_ns) close_block();
   }
-  /// Tells of the first one at once, of their number at the end.
+  /// Reports the first one at once, their number at the end.
   void watch_saturation() {
     const uint64_t before = outcome_.counts.saturated;
     outcome_.counts.saturated = 0;

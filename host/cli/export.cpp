@@ -201,7 +201,7 @@ ExitCode export_runs(const ExportOptions& options, const CommandOutput& out) {
     throw HardwareError(options.crate.string(), error.what(),
                         "Check the space on the disk and that you may write there.");
   }
-  // A single run's table, as it was told before there were crates.
+  // A single run's table, as it was printed before there were crates.
   if (files.size() == 1) document.update(document["bids"].front());
   print(out, document, [&] {
     for (const BidsFiles& each : files)

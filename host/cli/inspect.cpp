@@ -32,7 +32,7 @@ json attributes_json(const Attributes& attributes) {
   return object;
 }
 
-/// What /rig tells about a channel's calibration: cavity_calibrated_utc of cavity_kPa, and so on.
+/// What /rig states about a channel's calibration: cavity_calibrated_utc of cavity_kPa, and so on.
 Attributes calibration_of(const runfile::RecordedRun& run, const std::string& channel) {
   const std::string prefix = channel.substr(0, channel.rfind('_') + 1);
   Attributes calibration;
@@ -44,7 +44,7 @@ Attributes calibration_of(const runfile::RecordedRun& run, const std::string& ch
   return calibration;
 }
 
-/// Empty for a run that tells nothing of it.
+/// Empty for a run that states nothing of it.
 std::string calibration_words(const Attributes& calibration) {
   if (calibration.empty()) return {};
   const auto text = [&](const char* fact) {

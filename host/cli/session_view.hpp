@@ -25,7 +25,7 @@ class SessionView {
  public:
   explicit SessionView(bool terminal) : terminal_(terminal) {}
   void show(const SessionProgress& progress);
-  /// Tells that the operator's own key presses have moved the cursor down by so many lines.
+  /// Records that the operator's own key presses have moved the cursor down by so many lines.
   void entered(int lines) { lines_entered_ += lines; }
   /// Ends the renewed lines, if there are any.
   void finish();

@@ -109,7 +109,7 @@ class SegmentReader {
   std::vector<TableReader> tables_;
 };
 
-/// The schedule tells how many cycles its one segment has.
+/// The schedule says how many cycles its one segment has.
 void put_schedule(const TableReader& root, TableReader table, Experiment& experiment) {
   ExperimentSegment& segment = experiment.segments.front();
   if (experiment.segments.size() > 1 || segment.cycles != 1 || segment.waveform == wire::Waveform::hold) {

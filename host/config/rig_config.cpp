@@ -239,7 +239,7 @@ std::string default_socket() {
 
 void make_default_socket_folder() {
   const std::filesystem::path folder = std::filesystem::path(default_socket()).parent_path();
-  std::error_code failed;  // then the socket cannot be made, which is told
+  std::error_code failed;  // then the socket cannot be made, which is reported
   if (std::filesystem::create_directories(folder, failed))
     std::filesystem::permissions(folder, std::filesystem::perms::owner_all, failed);
 }

@@ -52,7 +52,7 @@ class QueuedSink final : public spdlog::sinks::base_sink<InheritingMutex> {
   void flush_() override {}
 
  private:
-  /// What cannot be written is lost: there is nowhere to tell it.
+  /// What cannot be written is lost: there is nowhere to report it.
   static void write_all(int descriptor, std::string_view text) {
     while (!text.empty()) {
       const ssize_t written = ::write(descriptor, text.data(), text.size());

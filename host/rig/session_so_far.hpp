@@ -2,7 +2,7 @@
 // What a session of slices has come to, by the journals that its runs have left: a session that was broken off, by a crash, a
 // fault or a stop, goes on with the first slice that was not imaged whole.
 //
-// A session's runs are journals of one experiment, told by its text; each names the run before it (BeginRecord::resumes) and the
+// A session's runs are journals of one experiment, identified by its text; each names the run before it (BeginRecord::resumes) and the
 // slices that were done by then. So the newest journal that no other names knows all of them.
 
 #include <cstdint>

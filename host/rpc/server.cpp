@@ -40,7 +40,7 @@ class Connection;
 using Connections = std::map<uint64_t, std::shared_ptr<Connection>>;
 
 /// One client of the daemon's socket: lines to and fro. It can cost the rig nothing: what it sends, what waits for it
-/// and how long are bounded, and whoever goes beyond a bound is answered or dropped, and the log tells.
+/// and how long are bounded, and whoever goes beyond a bound is answered or dropped, and logged.
 class Connection : public RpcSession {
  public:
   /// For the rest of a line that was begun.

@@ -124,7 +124,7 @@ void write_file(const std::filesystem::path& file, const std::filesystem::path& 
   must(::fsync(opened.get()) == 0, path, "cannot be brought to the disk");
 }
 
-/// What is to be told when the disk does not confirm the file's name.
+/// What is to be reported when the disk does not confirm the file's name.
 std::string confirm_name(const std::filesystem::path& path, const FlushDirectory& flush_directory) {
   const std::filesystem::path parent = path.has_parent_path() ? path.parent_path() : ".";
   const Descriptor directory(::open(parent.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));

@@ -19,7 +19,7 @@ class Clock {
   [[nodiscard]] virtual uint64_t now_ns() = 0;
   /// Returns when now_ns() has reached until_ns; in real time also as soon as `line` (may be null) has input.
   virtual void sleep_until_ns(uint64_t until_ns, ByteLine* line) = 0;
-  /// Tells the clock that `line` was just opened, before anything is written to it.
+  /// Notifies the clock that `line` was just opened, before anything is written to it.
   virtual void line_opened(ByteLine& /*line*/) {}
   /// True if time moves only inside sleep_until_ns: then it must not be passed idly.
   [[nodiscard]] virtual bool stands_still() const { return false; }

@@ -397,7 +397,7 @@ class H5Source {
       fail("dataset " + path, fmt::format("claims {} rows, and up to {} are read", rows, most), tampered);
     return static_cast<size_t>(rows);
   }
-  /// To convert rows HDF5 takes and clears a buffer of a megabyte, each time, unless it is told of a smaller one: more work than
+  /// To convert rows HDF5 allocates and clears a buffer of a megabyte, each time, unless it is given a smaller size: more work than
   /// the rest of a small table. It enlarges a buffer that does not hold a row.
   static PropertyHandle buffered_for(const DatasetHandle& table) {
     constexpr hsize_t usual_bytes = hsize_t{1} << 20;

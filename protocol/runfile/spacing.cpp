@@ -11,7 +11,7 @@ namespace diastole::runfile {
 namespace {
 
 constexpr size_t rows_around = 8;
-constexpr double hole_spacings_before_last = 1.1;  // the last row has none after it to tell late from shifted
+constexpr double hole_spacings_before_last = 1.1;  // no row follows the last to distinguish late from shifted
 
 constexpr size_t most_median_steps = size_t{1} << 17;
 

@@ -107,7 +107,7 @@ class SaturationWatch {
   int64_t values_ = 0;
   Saturated first_;  ///< the run that the recording begins with, once it has ended
   double first_left_by_ = kUnknown;
-  Saturated left_;  ///< a run that the last value has left: the next one tells by what steps
+  Saturated left_;  ///< a run that the last value has left: the next one shows by what steps
   double left_by_ = 0;
   double left_entered_by_ = 0;
 };

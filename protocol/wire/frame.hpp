@@ -17,7 +17,7 @@
 //     plain    34 12 04 02 00 03 07 00 E1 36 B2 38
 //     encoded  05 34 12 04 02 03 03 07 05 E1 36 B2 38 00
 //
-// This layout and the messages HelloRequest and Hello never change, so that any two versions can tell each
+// This layout and the messages HelloRequest and Hello never change, so that any two versions can report to each
 // other that they do not match.
 
 #include <array>

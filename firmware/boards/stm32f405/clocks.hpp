@@ -1,7 +1,7 @@
 #pragma once
 // 168 MHz from the crystal; APB1 timers at 84 MHz, USART3 at 42 MHz. A crystal that does not start, or is not the one
 // that this image was built for, is replaced by the chip's own oscillator: 168 MHz to 1 % at room temperature, enough to
-// speak with the host and to tell it, not to move by.
+// speak with the host and to report this, not to move by.
 
 namespace diastole::stm32 {
 

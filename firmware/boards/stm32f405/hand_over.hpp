@@ -1,5 +1,5 @@
 #pragma once
-// What bootloader and application tell each other over a reset, at the start of the retained memory
+// What bootloader and application pass to each other over a reset, at the start of the retained memory
 // (memory_map.hpp). It has a CRC, because memory is arbitrary after power-on.
 
 #include <cstdint>

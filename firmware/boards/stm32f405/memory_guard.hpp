@@ -5,7 +5,7 @@
 //                                       __stack_guard               region 0 over all: read, write, never executed
 //
 // A stack that grows beyond its 8 KB, and a jump into RAM, are a MemManage fault where they happen. With it on, usage and
-// bus faults are told from hard faults.
+// bus faults are distinguished from hard faults.
 
 #include <cstdint>
 

@@ -74,7 +74,7 @@ void PulseTimer::raise_ttl(std::uint32_t tick, Ticks width) {
   clear_flag(kCompare2);
   set_ttl_mode(kActiveOnMatch);
   if (has_passed(tick) && (tim2().SR.read() & kCompare2) == 0) {
-    // The match has been missed: a late trigger, told as such, is better than none that is counted.
+    // The match has been missed: a late trigger, reported as such, is better than none that is counted.
     set_ttl_mode(kHigh);
     tim2().CCR2.write(tim2().CNT.read());
     tim2().EGR.write(kCompare2);
