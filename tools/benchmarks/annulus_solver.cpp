@@ -83,7 +83,7 @@ bool is_installed(const AnnulusSolver& solver, const AnnulusWorkplace& place) {
   std::filesystem::create_directories(place.folder);
   if (solver.probe.empty()) return true;
   const int code = run_timed(solver.probe, place.folder, place.folder / "probe.log").exit_code;
-  constexpr int usage = 201;  // what ccx ends with after telling its version
+  constexpr int usage = 201;  // what ccx ends with after printing its version
   return code == 0 || code == usage;
 }
 

@@ -24,9 +24,9 @@ struct AnnulusAnswer {
   std::string newton;  ///< steps of Newton's method, in words
   std::array<double, 5> radial_mm{};
   ProcessCost process;
-  size_t factor_entries = 0;  ///< numbers in the factorised tangent; 0 if the program does not tell
+  size_t factor_entries = 0;  ///< numbers in the factorised tangent; 0 if the program does not say
   double solve_wall_s =
-      0.0;  ///< from the undeformed state to the answer; the whole process if not told apart
+      0.0;  ///< from the undeformed state to the answer; the whole process if not timed separately
   double solve_processor_s = 0.0;
 
   [[nodiscard]] double inner_error() const { return radial_mm[0] / annulus_radial_mm[0] - 1.0; }

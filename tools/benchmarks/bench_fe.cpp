@@ -5,7 +5,7 @@
 //
 // Each program climbs its ladder of meshes. Its mesh is the coarsest one from which on all finer ones keep the
 // accuracy, so that an error that happens to change its sign does not count. Then all solve in turn, N times
-// over; medians are told.
+// over; medians are reported.
 
 #include <fmt/format.h>
 

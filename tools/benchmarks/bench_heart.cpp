@@ -1,7 +1,7 @@
 // `tools/bench heart [--hearts N] [--mesh A,L,T] [--seed N] [--without-energy]`: coverage of a ventricle's four Guccione parameters.
 //
 // Each heart has parameters, fibres, walls, tag points, pressures with an offset, and a pressure-volume loop of its own, all drawn with the
-// errors that the fit is told (docs/heart.md). A row a heart; then how many true values, and how many sets of four, lie in their 90 % regions, with
+// errors that the fit is given (docs/heart.md). A row a heart; then how many true values, and how many sets of four, lie in their 90 % regions, with
 // the binomial 95 % interval (Wilson). Exit code 1 if a rate of 85 to 95 % is outside of it. Tag points are drawn, not tracked in images.
 
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-// A session in real time that is as long as it is told: samples and gaps against what was due, and the daemon's
+// A session in real time, as long as `--minutes` says: samples and gaps against what was due, and the daemon's
 // memory. A line a minute; exit code 1 if a sample is unaccounted for, one was lost, or the memory grew.
 //
 //   tools/bench soak --minutes 60     or   build/release/bin/bench_soak

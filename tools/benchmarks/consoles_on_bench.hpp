@@ -10,7 +10,7 @@ namespace diastole {
 
 class ConsolesOnBench {
  public:
-  /// `url`: with a token, as the daemon tells it. Throws HardwareError when one is not let in.
+  /// `url`: with a token, as the daemon reports it. Throws HardwareError when one is not let in.
   ConsolesOnBench(const std::string& url, int count);
 
  private:

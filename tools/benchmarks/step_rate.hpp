@@ -47,7 +47,7 @@ wire::AddSegment segment_of(const StepRateTrial& trial);
 StepRateFigures measure(const std::string& image, const StepRateTrial& trial);
 
 /// Interrupts at their worst: homing, cycles at 200,000 steps/s with TTL, R-wave and position stream, the line
-/// flooded, and an e-stop on the rise of the fourth. Only `problem` and `board` are told.
+/// flooded, and an e-stop on the rise of the fourth. Only `problem` and `board` are filled in.
 StepRateFigures measure_interrupts(const std::string& image);
 
 }  // namespace diastole

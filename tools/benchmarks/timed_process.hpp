@@ -16,7 +16,7 @@ struct ProcessCost {
 };
 
 /// `command[0]` is looked for in PATH; the program's output goes to `log`, its directory is `folder`. Numerical
-/// libraries are told to use one thread. Throws std::system_error when the machine starts no process at all.
+/// libraries are set to use one thread. Throws std::system_error when the machine starts no process at all.
 ProcessCost run_timed(const std::vector<std::string>& command, const std::filesystem::path& folder,
                       const std::filesystem::path& log);
 

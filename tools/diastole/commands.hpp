@@ -13,7 +13,7 @@ class SessionSeries;
 void add_batch(CommandLine& line);
 /// `diastole catheter`: the paper's test of catheter and transducer, from a recorded step of pressure.
 void add_catheter(CommandLine& line);
-/// `diastole compare`: what tells runs apart.
+/// `diastole compare`: what distinguishes runs.
 void add_compare(CommandLine& line);
 /// `diastole desk`: look at and correct tracking and contours in a browser.
 void add_desk(CommandLine& line);

@@ -26,7 +26,7 @@ std::string expected_of(const CLI::Option& option) {
   return type.starts_with("FLOAT") ? "a number" : type;
 }
 
-/// CLI11 tells no more than "Could not convert: --frames = many".
+/// CLI11 says no more than "Could not convert: --frames = many".
 std::string in_words(const CLI::App& command, const CLI::ConversionError& error) {
   const std::string text = error.what(), beginning = "Could not convert: ";
   const size_t equals = text.find(" = ");

@@ -72,7 +72,7 @@ bool is_inside(const ScoredCase& c) {
 
 double neutral_of(const std::string& parameter) { return parameter == "inertance_factor" ? 1.0 : 0.0; }
 
-/// Is the named effect an imperfection of this rig, told at no more than three times its size?
+/// Is the named effect an imperfection of this rig, reported at no more than three times its size?
 bool is_imperfection(const FoundEffect& effect, const Truth& truth) {
   const auto known = std::ranges::find(truth.imperfections, effect.id, &HiddenEffect::id);
   if (known == truth.imperfections.end()) return false;
@@ -180,7 +180,7 @@ struct ParameterError {
   bool covered;
 };
 
-/// Of each effect named right, the first parameter that the truth tells too: the effect's size.
+/// Of each effect named right, the first parameter that the truth states too: the effect's size.
 std::vector<ParameterError> parameter_errors(const ScoredCase& c) {
   std::vector<ParameterError> errors;
   for (const HiddenEffect& hidden : c.truth.hidden) {

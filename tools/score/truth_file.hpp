@@ -7,7 +7,7 @@
 //   {"format": "diastole-sealed", "format_version": 1, "seed": 7, "kind": "single",
 //    "truth": [{"id": "air-bubble-pump", "port": "drive", "parameters": {"volume_mL": 4.2}}]}
 //
-// Labels of rigs with imperfections ({"cases": ..., "rigs": ...}) also tell how large the effect is beside them and which of
+// Labels of rigs with imperfections ({"cases": ..., "rigs": ...}) also state how large the effect is beside them and which of
 // them an explanation may name.
 
 #include <filesystem>

@@ -47,7 +47,7 @@ class SimulatedController {
 
   [[nodiscard]] virtual Places places() const = 0;
 
-  /// When its own clock, which its messages tell, read 0.
+  /// When its own clock, which its messages report, read 0.
   [[nodiscard]] virtual uint64_t tick_zero_ns() const { return 0; }
 
   /// Bytes that have arrived on its serial line.

@@ -78,7 +78,7 @@ struct InstrumentInputs {
   std::function<double(int channel)> volts;  ///< at now_ns()
   /// Asked once before the inputs are read: whether this reading fails, with exception 11.
   std::function<bool()> reading_fails = [] { return false; };
-  /// Told when an answer comes that much late, or (never_ns) not at all.
+  /// Called when an answer comes that much late, or (never_ns) not at all.
   std::function<Wait(uint64_t late_ns)> wait = [](uint64_t) { return Wait::goes_on; };
   static constexpr uint64_t never_ns = UINT64_MAX;
 };

@@ -72,7 +72,7 @@ void write_dicom(const std::filesystem::path& path, const Picture& picture, cons
   put(DCM_Modality, "MR");
   const Storage storage = storage_of(label);
   put(DCM_Manufacturer, manufacturer_of(label));
-  // One maker leaves it to the pixels to tell which image is which.
+  // One maker leaves it to the pixels to show which image is which.
   const bool is_untold = label.velocity && label.velocity->maker == Maker::ge;
   put(DCM_ImageType, is_untold               ? "ORIGINAL\\PRIMARY\\OTHER"
                      : storage.units.empty() ? "ORIGINAL\\PRIMARY\\M"

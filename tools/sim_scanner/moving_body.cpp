@@ -14,7 +14,7 @@ namespace diastole::scanner {
 namespace {
 
 constexpr double in_plane_mm = 1.25, through_plane_mm = 2.0;
-constexpr double far_mm = 3.0;  // outside of the tissue, as far as it is told
+constexpr double far_mm = 3.0;  // outside of the tissue, as far as it is computed
 constexpr Eigen::Index seeds_apart = 6;
 constexpr double bath_mm = 10.0;  // of water around the specimen
 
@@ -233,7 +233,7 @@ Spot SliceOfBody::at(const Eigen::Vector3d& within_mm) const {
     const Node& node = nodes_[index({i + a, j + b, k + c})];
     X_mm += share * node.X_mm;
     outside_mm += share * node.outside_mm;
-    // What is beyond is told best by the corner that is farthest outside.
+    // What is beyond is known best from the corner that is farthest outside.
     const double weight = share * (node.outside_mm + far_mm);
     if (weight <= nearest) continue;
     nearest = weight;

@@ -1,5 +1,5 @@
 #pragma once
-// What tells runs apart: what was known and set, and the pressure over the cycle against the noise of both.
+// What distinguishes runs: what was known and set, and the pressure over the cycle against the noise of both.
 //
 // Of each segment and channel the cycles are averaged in equal parts of the period (protocol/runfile/frame_bins.hpp), which gives a
 // mean m and its variance v from the scatter over n cycles. Run b differs from the first, a, in a part beyond noise if

@@ -3,7 +3,7 @@
 //   frame, upwards from the new stack pointer:
 //     r0 r1 r2 r3 r12 lr pc xpsr                          32 bytes
 //     then, when the FPU was in use: s0 ... s15 fpscr -   72 bytes more
-//   xpsr bit 9 tells that 4 bytes were left out to align the frame to 8.
+//   xpsr bit 9 says that 4 bytes were left out to align the frame to 8.
 
 #include <array>
 #include <cstdio>
