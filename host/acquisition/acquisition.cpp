@@ -225,10 +225,8 @@ class Acquisition {
     note(gate_->close(clock_.now_ns(), {outcome_.counts.triggers, stopped_by_estop_}, triggers_raised_));
   }
   void note(const std::vector<GateRemark>& remarks) {
-    for (const GateRemark& each : remarks) {
-      write(EventRecord{{}, each.host_ns, each.level, each.code, each.text});
-      hooks_.remark({each.level, each.code, each.text});
-    }
+    for (const GateRemark& each : remarks)
+      keep({{}, each.host_ns, each.level, each.code, each.text});
   }
   void end_missing() {
     close_gap();
@@ -341,8 +339,12 @@ class Acquisition {
   }
   void remark(const std::string& level, const std::string& code, const std::string& text,
               std::optional<uint64_t> tick = {}) {
-    write(EventRecord{tick, tick ? 0 : clock_.now_ns(), level, code, text});
-    hooks_.remark({level, code, text});
+    keep({tick, tick ? 0 : clock_.now_ns(), level, code, text});
+  }
+  void keep(const EventRecord& event) {
+    if (event.level == "error") outcome_.last_error = event.text;
+    write(event);
+    hooks_.remark({event.level, event.code, event.text});
   }
   void write(const auto& record) {
     if (!append(journal_, record)) fail_journal();
@@ -350,6 +352,7 @@ class Acquisition {
   void fail_journal() {
     if (outcome_.end == journal_failed) return;
     outcome_.end = journal_failed;
+    outcome_.last_error = journal_.problem();
     hooks_.remark({"error", journal_failed, journal_.problem() + "; the pump is being stopped"});
     if (tail_until_ns_) ended_ = true;  // the pump is at rest already
     if (ended_) return;

@@ -176,11 +176,14 @@ void RigService::do_run(RunOrder order, const Done& done) {
   spdlog::info("run {} begins: {} cycles, {:.1f} s", run.run_id, run.planned_cycles, run.planned_s);
   done(nullptr, RunBegun{run.run_id, path.string(), run_file_beside(path).string()});
   RunResult result;
+  RunOutcome outcome;
   try {
-    result = finish(path, acquire(journal, order, rate, run.planned_s));
+    outcome = acquire(journal, order, rate, run.planned_s);
+    result = finish(path, outcome);
   } catch (const std::exception& error) {
     if (controller_->connected()) controller_->stop_now();  // nothing moves unrecorded
-    result = {.end = "failed", .journal = path.string(), .problem = error.what()};
+    const std::string cause = outcome.last_error.empty() ? "" : outcome.last_error + "; ";
+    result = {.end = "failed", .journal = path.string(), .problem = cause + error.what()};
   }
   if (controller_->last_known().state == wire::State::armed) disarm(*controller_);
   spdlog::info("run {} ended: {}, {}", run.run_id, result.end,

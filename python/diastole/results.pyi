@@ -614,6 +614,7 @@ class SearchEnd(Record):
 
     effects: list[str]
     termination: str
+    of_reference: bool
 
 @dataclass(frozen=True)
 class FoundEffect(Record):

@@ -34,7 +34,7 @@ struct EffectSet {
   Eigen::MatrixXd columns;     ///< of the evidence's linear unknowns: the effects', then the nuisances
   double log_posterior = 0.0;  ///< evidence and prior
   bool exact = false;          ///< its tolerances were simulated
-  inference::Termination termination = inference::Termination::converged;
+  inference::Termination termination = inference::Termination::no_solution;
 
   [[nodiscard]] std::vector<std::string> ids() const;  ///< sorted
   /// What the evidence's linear unknowns are to explain.

@@ -216,8 +216,10 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   }
 
   options.report("judging");
-  const bool from_reference = !study.data.reference.empty();
-  const SetVerdict verdict = judge_sets(problem, search, {from_reference});
+  const bool from_reference = learnt.has_value();
+  const ErrorKnowledge error{from_reference,
+                             learnt ? learnt->termination : inference::Termination::converged};
+  const SetVerdict verdict = judge_sets(problem, search, error);
   const EffectSet& plain = search.sets[verdict.plain];
   const bool is_found = verdict.verdict == Verdict::named || verdict.verdict == Verdict::ambiguous;
   const EffectSet& chosen = search.sets[verdict.chosen];
@@ -262,7 +264,7 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
       out.not_learned = "nothing exceeds the model's own error";
     } else if (options.learn || (out.verdict == Verdict::unexplained && !verdict.is_tone_alone)) {
       out.not_learned = "it was interrupted";
-      Learning learning = learn_term(problem, after, {from_reference}, report);
+      Learning learning = learn_term(problem, after, error, report);
       out.learned = std::move(learning.term);
       out.not_learned = std::move(learning.lacks);
     }

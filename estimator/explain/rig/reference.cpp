@@ -58,6 +58,7 @@ struct Fitted {
   rig::SpecimenFamily family;
   SessionProblem problem;
   rig::EvidenceFit evidence;
+  inference::Termination termination = inference::Termination::no_solution;
 
   Fitted(Study of, size_t threads)
       : study(std::move(of)),
@@ -72,7 +73,9 @@ struct Fitted {
     start.at.u.tail(tolerances.size()) = root.triangularView<Eigen::Lower>().solve(tolerances - before.mean);
     start.columns = problem.nuisance_columns(start.at, start.there);
     const EffectSet linear = fit_set(problem, start.at, start, problem.error().prior.share);
-    evidence = fit_set_exactly(problem, linear).evidence;
+    EffectSet exact = fit_set_exactly(problem, linear);
+    evidence = std::move(exact.evidence);
+    termination = exact.termination;
   }
   /// What is known after it.
   [[nodiscard]] Knowledge knowledge(const Knowledge& before) const {
@@ -193,6 +196,8 @@ Reference learn_reference(const std::vector<Study>& studies, size_t threads,
   std::array<double, signal_count> squares{}, rows{};
   for (const auto& fit : fits) {
     fit->fit(known, known.mean);
+    if (inference::is_settled(out.termination) && !inference::is_settled(fit->termination))
+      out.termination = fit->termination;
     for (size_t g = 0; g < error_groups; ++g)
       out.all[g] += std::pow(fit->evidence.shares[g], 2) / static_cast<double>(fits.size());
     for (const FeatureBlock& block : fit->problem.features().blocks()) {

@@ -7,6 +7,7 @@
 #include "estimator/io/cache.hpp"
 #include "estimator/io/record_file.hpp"
 #include "estimator/io/study_fingerprint.hpp"
+#include "estimator/io/termination_json.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/json_text.hpp"
@@ -17,7 +18,7 @@ namespace {
 using Eigen::Index;
 
 /// The rules by which references are learnt: another number makes what is in caches old.
-constexpr int learning_version = 14;
+constexpr int learning_version = 15;
 
 constexpr RecordFormat format{
     "diastole-reference", "a reference of a rig",
@@ -57,6 +58,7 @@ std::string to_json(const Reference& reference) {
   }
   json["fingerprint"] = reference.fingerprint;
   json["sessions"] = reference.sessions;
+  json["termination"] = reference.termination;
   json["rig"] = {{"hose_length_m", reference.hose_length_m}, {"hose_bore_mm", reference.hose_bore_mm}};
   json["shares"] = {{"all", reference.all}, {"again", reference.again}};
   json["tolerances"] = {{"names", reference.tolerances},
@@ -82,6 +84,8 @@ Reference reference_from_json(std::string_view text, const std::string& file) {
     }
     reference.fingerprint = json.at("fingerprint").get<std::string>();
     reference.sessions = json.at("sessions").get<size_t>();
+    if (json.contains("termination"))
+      reference.termination = json.at("termination").get<inference::Termination>();
     if (json.contains("rig")) {
       reference.hose_length_m = json.at("rig").at("hose_length_m").get<double>();
       reference.hose_bore_mm = json.at("rig").at("hose_bore_mm").get<double>();

@@ -279,7 +279,8 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
     return fit_with_shares(z, columns, problem.error(), from);
   };
   out.evidence = judged(shares);
-  for (int round = 0; round < most_rounds; ++round) {
+  bool is_ended = false;
+  for (int round = 0; round < most_rounds && !is_ended; ++round) {
     set.set_variance(out.evidence.variance);
     inference::SearchOptions options;
     options.iteration_limit = 40;  // a bubble and its exponent go a long way along a valley
@@ -290,7 +291,8 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
     options.held = set.moments();  // event_scan.hpp; what is shown changes by leaps with them
     const inference::SearchResult found = minimise(set, q, options);
     out.termination = found.termination;
-    if (found.termination == inference::Termination::no_solution) break;
+    is_ended = found.termination == inference::Termination::no_solution;
+    if (is_ended) break;
     q = found.q;
     // Slopes by differences to one side hold curvature: a search that they end goes on with those to both.
     const bool again = found.termination == inference::Termination::stalled && set.differ_to_both_sides();
@@ -301,10 +303,14 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
     if (!again && !(has_no_end && round == 0) && std::abs(out.evidence.log_evidence - before) < rested) {
       // Many steps that together bring less than decides anything: it has arrived.
       if (has_no_end) out.termination = inference::Termination::converged;
-      break;
+      is_ended = true;
+    } else {
+      is_ended =
+          out.evidence.log_evidence + log_prior(problem, set, set.model(q)) < best_so_far - out_of_reach;
     }
-    if (out.evidence.log_evidence + log_prior(problem, set, set.model(q)) < best_so_far - out_of_reach) break;
   }
+  if (inference::is_settled(out.termination) && !(is_ended && out.evidence.settled))
+    out.termination = inference::Termination::iteration_limit;
   out.model = set.model(q);
   out.shown = set.shown(q);
   out.known = {.at = out.model, .there = out.shown, .columns = known.columns};

@@ -315,6 +315,8 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const WeighedSets& sea
   out.size_over_error = sizes.over_error;
   out.material = sizes.material;
   out.searches.push_back({{}, plain.termination});
+  if (!inference::is_settled(error.reference_termination))
+    out.searches.push_back({{}, error.reference_termination, true});
   // Hints alone need no search that settled: nothing is named by it.
   const bool is_more = ids.size() > search.given;
   if (is_more) out.searches.push_back({best.ids(), best.termination});

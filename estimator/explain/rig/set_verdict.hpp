@@ -24,6 +24,7 @@ namespace diastole::explain {
 /// What is known of the model's error, and how much larger than it an effect has to be for a name.
 struct ErrorKnowledge {
   bool from_reference = false;
+  inference::Termination reference_termination = inference::Termination::converged;
   /// An error that is stated or estimated is known within a factor of two (SharePrior); what references left comes again within 1.5.
   [[nodiscard]] double least_size() const { return from_reference ? 1.5 : 2.0; }
 };

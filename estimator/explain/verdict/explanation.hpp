@@ -166,7 +166,8 @@ struct Step {
 /// How the search of a fit that the verdict rests on ended.
 struct SearchEnd {
   std::vector<std::string> effects;  ///< none: the base model's
-  inference::Termination termination = inference::Termination::converged;
+  inference::Termination termination = inference::Termination::no_solution;
+  bool of_reference = false;  ///< not of this study's recordings
 };
 /// Whether all of them did so where they were to end.
 bool is_settled(const std::vector<SearchEnd>& searches);

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "estimator/io/record_file.hpp"
+#include "estimator/io/termination_json.hpp"
 #include "protocol/contract/json_text.hpp"
 
 namespace diastole {
@@ -53,7 +54,7 @@ DIASTOLE_MEMBERS(Step, added, reduced_chi_square)
 
 DIASTOLE_MEMBERS(NextExperiment, toml, separates, predicted_separation_sigma, reason)
 
-DIASTOLE_MEMBERS(SearchEnd, effects, termination)
+DIASTOLE_MEMBERS(SearchEnd, effects, termination, of_reference)
 
 DIASTOLE_MEMBERS(Explanation, study, verdict, confidence, model_error, reference, departures, cycle_scatter,
                  hints, summary, converged, searches, effects, ambiguous_with, where, gap, learned,
@@ -67,18 +68,6 @@ struct JsonWords<explain::Verdict> {
   static constexpr std::array all{explain::Verdict::named, explain::Verdict::ambiguous,
                                   explain::Verdict::unexplained, explain::Verdict::none};
   static constexpr auto word_of = explain::name_of;
-};
-
-template <>
-struct JsonWords<inference::Termination> {
-  using enum inference::Termination;
-  static constexpr const char* kind = "termination";
-  static constexpr std::array all{converged, on_bound, stalled, iteration_limit, interrupted, no_solution};
-  static constexpr std::array words{"converged",       "on-bound",    "stalled",
-                                    "iteration-limit", "interrupted", "no-solution"};
-  static const char* word_of(inference::Termination termination) {
-    return words[static_cast<size_t>(termination)];
-  }
 };
 
 namespace explain {

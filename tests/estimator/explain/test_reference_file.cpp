@@ -20,6 +20,7 @@ TEST(Reference, IsReadAsItWasWritten) {
   reference.percent_of_range = {0.3, 1.1, 0.0};
   reference.sessions = 2;
   reference.fingerprint = "0badcafe";
+  reference.termination = inference::Termination::stalled;
   const Reference read = reference_from_json(to_json(reference), "rig.reference.json");
   EXPECT_EQ(read.tolerances, reference.tolerances);
   EXPECT_EQ(read.covariance, reference.covariance);
@@ -27,6 +28,7 @@ TEST(Reference, IsReadAsItWasWritten) {
   EXPECT_EQ(read.again, reference.again);
   EXPECT_DOUBLE_EQ(read.rms[0], 0.012);
   EXPECT_EQ(read.fingerprint, "0badcafe");
+  EXPECT_EQ(read.termination, inference::Termination::stalled);
 }
 
 TEST(Reference, TeachesOfTheCouplingWhatItTellsMoreOfThanIsKnownOfAny) {

@@ -103,5 +103,13 @@ TEST_F(SimulatedSession, WithALeakIsNotNamedByASearchThatDidNotSettle) {
   EXPECT_EQ(unsettled.confidence, 0.5);
 }
 
+TEST_F(SimulatedSession, WithALeakIsNotNamedByAReferenceWhoseSearchDidNotSettle) {
+  search({.terms = {{find_effect("cannula-leak-cavity"), {}}}, .values = {0.15}, .seed = 5});
+  ASSERT_EQ(judge_sets(*problem_, found_, {true}).verdict, Verdict::named);
+  const SetVerdict unsettled = judge_sets(*problem_, found_, {true, inference::Termination::stalled});
+  EXPECT_EQ(unsettled.verdict, Verdict::unexplained);
+  EXPECT_TRUE(unsettled.searches.back().of_reference || unsettled.searches[1].of_reference);
+}
+
 }  // namespace
 }  // namespace diastole::explain
