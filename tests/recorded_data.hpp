@@ -7,7 +7,7 @@
 
 namespace diastole::test {
 
-/// The file or folder `name` ("rig/case-009") of tests/data or, if it is not there, of ../shared/data; neither need exist.
+/// The file or folder `name` ("rig/case-009") of tests/data or, if it is not there, of shared/data beside the tree; neither need exist.
 inline std::filesystem::path recorded(std::string_view name) {
   const std::filesystem::path source = DIASTOLE_SOURCE_DIR;
   const std::filesystem::path in_tree = source / "tests/data" / name;

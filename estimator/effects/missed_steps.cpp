@@ -17,7 +17,7 @@ void apply(EffectValues values, const EffectContext& context, rig::RigModel& mod
   const std::vector<ChangePoint> moments(context.change_points.begin(), context.change_points.end());
   if (lost_mL == 0.0 || moments.empty()) return;
   // Behind the screw's own error. A screw that loses turns errs by another angle from then on; what is lost behind it (a nut, a rod)
-  // leaves the angle, as the recording r3-05 of world 2 does, whose pump's sensor shows it.
+  // leaves the angle, as in a recording of world 2 (docs/explain.md), whose pump's sensor shows it.
   model.has_corners = true;
   model.drive.emplace_back([=](rig::DriveTrace& trace, const rig::RunPlace& place) {
     for (const ChangePoint& moment : moments) {

@@ -31,7 +31,7 @@ namespace diastole {
 
 /// The tri-linear Lagrange pressure: eight values an element, either its own (discontinuous) or shared at the
 /// nodes. Corners that coincide on a collapsed edge share one value either way, so that the pressure is single
-/// there. The solver's default is the discontinuous one: docs/decisions/0011-discontinuous-pressure.md.
+/// there. The solver's default is the discontinuous one: docs/decisions/0010-hermite-meshes-with-a-discontinuous-pressure.md.
 enum class PressureSpace { per_element, continuous };
 
 struct PressureMap {

@@ -9,7 +9,8 @@
 // so that K learns from each step how the tangent has changed since, without being factorised again. A step that
 // shrinks by less than a tenth, or the twentieth, asks for a new tangent (Deuflhard asks when one does not halve; but a
 // step here costs a twentieth of a tangent, and after one slow step in the beginning the next ones are fast). After
-// a first step as large as the whole body (size 1) the solution is far, and each must shrink fivefold.
+// a first step as large as the whole body (size 1) the solution is far, and each must shrink fivefold: the beam of Land et al.
+// takes 10 to 11 tangents so, and 21 otherwise.
 
 #include <functional>
 #include <optional>

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <map>
 #include <regex>
+#include <set>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -134,6 +135,33 @@ TEST(Documents, EveryHeaderThatACommentNamesExists) {
       const std::string name = (*match)[1];
       EXPECT_NE(headers.find("/" + name + "\n"), std::string::npos)
           << fs::relative(source, root) << " names " << name << ", which does not exist";
+      ++named;
+    }
+  }
+  EXPECT_GT(named, 0);
+}
+
+// Recordings are cited by name only where a clone has them; what another one is, words say.
+TEST(Documents, EveryRecordingThatIsNamedIsInTheTree) {
+  static const std::regex name(R"(\b(case-\d{3}|field-\d{3}|r\d-\d{2})\b)");
+  std::set<std::string> recordings;
+  for (const auto& entry : fs::recursive_directory_iterator(root / "tests/data")) {
+    const std::string file = entry.path().filename();
+    recordings.insert(file.substr(0, file.find('.')));
+  }
+  std::vector<fs::path> texts = documents();
+  for (const char* room : {"protocol", "firmware", "host", "estimator", "tools", "examples", "python"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(root / room)) {
+      static const std::set<std::string> kinds{".hpp", ".cpp", ".inc", ".md", ".toml", ".py"};
+      if (kinds.contains(entry.path().extension())) texts.push_back(entry.path());
+    }
+  }
+  int named = 0;
+  for (const fs::path& document : texts) {
+    const std::string text = text_of(document);
+    for (std::sregex_iterator match(text.begin(), text.end(), name), end; match != end; ++match) {
+      EXPECT_TRUE(recordings.contains((*match)[1])) << fs::relative(document, root) << " names the recording "
+                                                    << (*match)[1] << ", which is not in tests/data";
       ++named;
     }
   }

@@ -90,7 +90,7 @@ int main(int argc, char** argv) {
   std::vector<std::string> words;
   bool worlds = false;
   const fs::path source = DIASTOLE_SOURCE_DIR;
-  bench::WorldsOptions of_worlds{.data = source / "../shared/data",
+  bench::WorldsOptions of_worlds{.data = source.parent_path() / "shared/data",
                                  .kept = source / "build/explained/worlds"};
   app.add_option("FOLDER", words, "with a labels.json, then names or kinds of the cases wanted");
   app.add_flag("--worlds", worlds, "three worlds, with references and without (explain_worlds.hpp)");

@@ -1,5 +1,5 @@
 // `tools/bench fibres [FOLDER] [--case NAME ...] [--true-wall]`: tensors and fibre fields against labelled diffusion series (FOLDER/NAME/dicom,
-// NAME.guide.csv, FOLDER/truth and labels.json), default ../shared/data/dti.
+// NAME.guide.csv, FOLDER/truth and labels.json), default shared/data/dti beside the tree and no part of it.
 //
 // A row a case: tensors against the truth (RMS of the six numbers over voxels that are all tissue, 1e-3 mm²/s), the field's error at the truth's
 // places in normal tissue (l >= 0.15) on the mesh that `diastole lv` fits to the guide points - with --true-wall on the true ellipsoid -, the

@@ -1,5 +1,5 @@
 // `tools/bench flow [FOLDER]`: phase contrast against labelled scans (FOLDER/labels.json, FOLDER/NAME/dicom with its pressure and triggers), default
-// ../shared/data/imaging.
+// shared/data/imaging beside the tree and no part of it.
 //
 // A row a scan: stroke volume, what a cycle does not return, peak flow and the loop's area against the truth, the background's error that is stated, phases whose
 // flow lies in its 95 % interval. Figures that miss their targets are marked MISSED, and any of them makes the exit code 1.

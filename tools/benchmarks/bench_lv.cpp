@@ -1,5 +1,6 @@
 // `tools/bench lv [FOLDER] [--random N] [--example FILE]`: ventricles from guide points against labelled ones (FOLDER/NAME/NAME.guide.csv with
-// FOLDER/truth/NAME.surfaces.csv and NAME.volumes.csv, displacements in FOLDER/labels.json), default ../shared/data/dti, and against random ones.
+// FOLDER/truth/NAME.surfaces.csv and NAME.volumes.csv, displacements in FOLDER/labels.json), default shared/data/dti beside the tree and no part of it,
+// and against random ones.
 //
 // A row a phase: RMS of the true walls' points from the fitted ones, the error of the cavity's volume and how many sigmas that is.
 // Figures that miss their targets are marked MISSED, and any of them makes the exit code 1. `--example` writes the guide points of docs/lv.md.

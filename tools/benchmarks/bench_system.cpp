@@ -3,7 +3,9 @@
 //
 //   tools/bench system [--rounds N]     least times of N rounds, taken in turn
 //
-// The figures are in docs/decisions/0012-newton-and-factorisation.md.
+// docs/decisions/0012-newton-and-factorisation.md rests on its figures. On a busy machine, the tangent of 8x4x1 at 3 kPa with analysis and
+// one solution: MUMPS 75 ms, SparseLU 259, UMFPACK 404, LDLT without pivoting 368. All element tangents of 8x8x4 in two threads:
+// parallel_for 223 and 292 ms, OpenMP 328 and 448.
 
 #include <fmt/format.h>
 

@@ -1,5 +1,5 @@
 // `tools/bench track [FOLDER] [--case NAME ...] [--no-fits]`: tag tracking against labelled images (FOLDER/NAME/dicom with truth.h5, and
-// FOLDER/labels.json), default ../shared/data/imaging.
+// FOLDER/labels.json), default shared/data/imaging beside the tree and no part of it.
 //
 // A row a case: the error along the tags' normal at phases 1-4, 8 and 16 in pixels, that of harmonic phase at the same places, how
 // much of the lines is kept, wild points (more than a pixel off), the variance of errors over their sigma - of the smooth places and

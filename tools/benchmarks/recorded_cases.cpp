@@ -15,7 +15,7 @@ std::optional<Recordings> recordings_of(int argc, char** argv) {
   }
   Recordings found{
       .folder = argc > 1 ? std::filesystem::path(argv[1])
-                         : std::filesystem::path(DIASTOLE_SOURCE_DIR) / "../shared/data/rig",
+                         : std::filesystem::path(DIASTOLE_SOURCE_DIR).parent_path() / "shared/data/rig",
       .labels = {},
       .wanted = {argv + std::min(argc, 2), argv + argc},
   };

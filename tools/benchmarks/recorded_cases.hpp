@@ -16,7 +16,7 @@ struct Recordings {
   std::vector<std::string> wanted;  ///< names and kinds; empty: all
 };
 
-/// By default of ../shared/data/rig beside the source tree. None, and a line that says so, without a labels.json
+/// By default of shared/data/rig beside the tree and no part of it. None, and a line that says so, without a labels.json
 /// or where an option is asked for.
 std::optional<Recordings> recordings_of(int argc, char** argv);
 

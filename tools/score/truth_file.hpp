@@ -33,7 +33,7 @@ struct HiddenEffect {
 };
 
 struct Truth {
-  std::string name;  ///< of the case: "case-017", "field-004-shear"
+  std::string name;  ///< of the case: "case-054", "field-003"
   TruthKind kind = TruthKind::none;
   std::vector<HiddenEffect> hidden;
   std::vector<std::vector<std::string>>

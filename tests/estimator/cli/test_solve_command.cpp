@@ -232,7 +232,7 @@ TEST_F(SolveCommand, PullsAlongTheFibresOfABodyThatHasThem) {
   EXPECT_LT(active["cavity_volume_change_mL"].get<double>(), 0.0);
 }
 
-// The gel's pressures have more negative pivots than unknowns there (decision 0011): its wall is thick, and stays round.
+// The gel's pressures have more negative pivots than unknowns there (decision 0010): its wall is thick, and stays round.
 TEST_F(SolveCommand, DoesNotCallSuctionOfTheGelUnstable) {
   const auto json = nlohmann::json::parse(run({"--pressure-kPa", "-6", "--json"}).output);
   EXPECT_EQ(json["reason"], "converged");

@@ -57,7 +57,7 @@ TEST(Effects, AreThePageOfTheDocuments) {
   EXPECT_EQ(page, effects_page()) << "build/release/bin/effects_table > docs/effects.md";
 }
 
-/// The search for a lump sets an Inclusion's seven parameters in their order.
+/// The search for an inclusion sets an Inclusion's seven parameters in their order.
 TEST(Effects, HaveOneInclusion) {
   EXPECT_EQ(std::ranges::count_if(all_effects(), &Effect::is_inclusion), 1);
   FieldModel model;

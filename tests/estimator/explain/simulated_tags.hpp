@@ -1,5 +1,5 @@
 #pragma once
-// Tag points of a specimen with hidden field effects, as ../shared/data/README.md describes them: six short-axis slices
+// Tag points of a specimen with hidden field effects, made as those of tests/data/fe: six short-axis slices
 // with stripes along (1, +-1, 0), six long-axis ones every 30 degrees with stripes along e +- z, 5 mm apart with random phase,
 // slices fixed in space, errors along the normal, pressures with errors. Equilibria are solved on finer meshes than explain
 // uses, in every frame.

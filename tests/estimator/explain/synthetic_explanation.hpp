@@ -1,5 +1,5 @@
 #pragma once
-// Explanations as the engine would hand them over, without a rig: pressures with a made-up effect, tags with a lump.
+// Explanations as the engine would hand them over, without a rig: pressures with a made-up effect, tags with an inclusion.
 
 #include "estimator/explain/verdict/explanation.hpp"
 

@@ -189,7 +189,7 @@ TEST(Inertia, OneNegativePivotAPressureAtRestAndUnderLoad) {
   EXPECT_EQ(model.solve(6.0).report.negative_pivots, model.pressure_dofs());
 }
 
-// Why the pressure is discontinuous: docs/decisions/0011-discontinuous-pressure.md.
+// Why the pressure is discontinuous: docs/decisions/0010-hermite-meshes-with-a-discontinuous-pressure.md.
 TEST(Inertia, ContinuousPressureHasSpuriousNegativePivotsOnTheUniformMesh) {
   AnnulusShape shape = gel_shape({8, 4, 1});
   shape.plate_grading = shape.wall_grading = 0.0;
@@ -244,7 +244,7 @@ TEST(Failure, ALoadBeyondTheLimitEndsWithTheLastEquilibriumAndTheHistory) {
   EXPECT_NE(solution.report.describe().find("was reached"), std::string::npos);
 }
 
-// A lump in one element through the wall: while the pressure had to follow its stiffness, what a point moves was off by more than it moves.
+// An inclusion in one element through the wall: while the pressure had to follow its stiffness, what a point moves was off by more than it moves.
 TEST(UnevenStiffness, BendsACoarseMeshAsItBendsAFineOne) {
   for (const double contrast : {0.3, 4.0}) {
     ElasticModel coarse = gel(6.5, {8, 4, 1}, {.stiffness = lump(contrast)});
