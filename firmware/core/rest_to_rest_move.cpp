@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "firmware/core/fixed_point.hpp"
+#include "firmware/core/arithmetic/fixed_point.hpp"
 
 namespace diastole::firmware {
 

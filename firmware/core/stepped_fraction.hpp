@@ -6,7 +6,7 @@
 
 #include <cstdint>
 
-#include "firmware/core/fixed_point.hpp"
+#include "firmware/core/arithmetic/fixed_point.hpp"
 
 namespace diastole::firmware {
 

@@ -7,12 +7,14 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <vector>
 
 #include "protocol/contract/input_error.hpp"
 #include "tests/faults/fault_table.hpp"
 #include "tests/sanitized.hpp"
 #include "tests/tools/sim_board/chip_bench.hpp"
 #include "tests/tools/sim_board/flash_bench.hpp"
+#include "tests/tools/sim_board/flash_history.hpp"
 #include "tests/tools/sim_board/late_trigger.hpp"
 
 namespace diastole::faults {
@@ -60,14 +62,19 @@ TEST(Faults, BrownOut) {
 TEST(Faults, CutErase) {
   NEEDS_FULL_COUNTS_ON_CHIP();
   NEEDS_UPDATE_IMAGES();
+  FlashBench updated;
+  ASSERT_EQ(updated.runs(), "0.1.0 confirmed");
+  ASSERT_TRUE(updated.flash(newer_update).verified);
+  updated.power_cycle();
+  ASSERT_TRUE(updated.flash(first_update, {.allow_older = true}).verified);
+  // Slot B holds something now, so that it must be erased.
+  const std::vector<uint8_t> before(updated.board().flash().begin(), updated.board().flash().end());
   const int tried = trials(0, 40);
   const int survived = survivors(tried, [&](int, std::mt19937& random) {
     FlashBench bench(factory_image, {.cell_seed = static_cast<uint32_t>(random())});
-    if (bench.runs() != "0.1.0 confirmed") return false;
-    if (!bench.flash(newer_update).verified)
-      return false;  // slot B holds something, so that it must be erased
-    bench.power_cycle();
-    if (!bench.flash(first_update, {.allow_older = true}).verified) return false;
+    if (bench.runs() != "0.1.0 confirmed") return false;  // and the option bytes are set
+    bench.board().power_off();
+    put_flash(bench.board(), before);
     bench.power_cycle();
     // The record of the erase and the erase itself are the first operations of the update.
     bench.board().cut_power_at_flash_operation(1 + random() % 6);

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 
-#include "firmware/core/fixed_point.hpp"
+#include "firmware/core/arithmetic/fixed_point.hpp"
 
 namespace diastole::firmware {
 namespace {

@@ -19,7 +19,8 @@ struct Rule {
   std::vector<std::string_view> may_include;
 };
 
-struct Violation {
+/// A line that includes a header of this project.
+struct Include {
   std::string file;  ///< relative to the root
   int line;
   std::string included;
@@ -29,6 +30,9 @@ struct Violation {
 const std::vector<Rule>& rules();
 
 /// Every include of a project header under `root` that no rule allows. Only the source folders are read.
-std::vector<Violation> violations(const std::filesystem::path& root);
+std::vector<Include> violations(const std::filesystem::path& root);
+
+/// Every include of another folder from which, directly or through others, the way leads back.
+std::vector<Include> circles(const std::filesystem::path& root);
 
 }  // namespace diastole::layering

@@ -11,21 +11,47 @@ namespace {
 namespace fs = std::filesystem;
 
 TEST(Layering, TheTreeFollowsTheDirectionOfDependence) {
-  for (const Violation& violation : violations(DIASTOLE_SOURCE_DIR)) {
+  for (const Include& violation : violations(DIASTOLE_SOURCE_DIR)) {
     ADD_FAILURE() << violation.file << ":" << violation.line << " may not include \"" << violation.included
                   << "\"";
   }
+}
+
+TEST(Layering, NoFoldersIncludeEachOtherInACircle) {
+  for (const Include& include : circles(DIASTOLE_SOURCE_DIR))
+    ADD_FAILURE() << include.file << ":" << include.line << " includes \"" << include.included
+                  << "\", from which the way leads back";
+}
+
+fs::path planted_root() {
+  const fs::path root = fs::path(testing::TempDir()) / ("planted-" + std::to_string(::getpid()));
+  fs::remove_all(root);
+  return root;
+}
+
+void plant(const fs::path& file, const std::string& included) {
+  fs::create_directories(file.parent_path());
+  std::ofstream(file) << "#pragma once\n#include \"" << included << "\"\n";
+}
+
+TEST(Layering, ACircleThroughThreeFoldersIsFound) {
+  const fs::path root = planted_root();
+  plant(root / "estimator/a/a.hpp", "estimator/b/b.hpp");
+  plant(root / "estimator/b/b.hpp", "estimator/c/c.hpp");
+  plant(root / "estimator/c/c.hpp", "estimator/a/a.hpp");
+  plant(root / "estimator/d/d.hpp", "estimator/a/a.hpp");
+  const std::vector<Include> found = circles(root);
+  fs::remove_all(root);
+  EXPECT_EQ(found.size(), 3U);
 }
 
 class PlantedViolation : public testing::TestWithParam<std::pair<std::string, std::string>> {};
 
 TEST_P(PlantedViolation, IsFound) {
   const auto& [file, included] = GetParam();
-  const fs::path root = fs::path(testing::TempDir()) / ("planted_violation-" + std::to_string(::getpid()));
-  fs::remove_all(root);
-  fs::create_directories((root / file).parent_path());
-  std::ofstream(root / file) << "#pragma once\n#include \"" << included << "\"\n";
-  const std::vector<Violation> found = violations(root);
+  const fs::path root = planted_root();
+  plant(root / file, included);
+  const std::vector<Include> found = violations(root);
   fs::remove_all(root);
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].file, file);

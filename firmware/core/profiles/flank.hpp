@@ -6,7 +6,7 @@
 //   y = v (p - b/2)        b ≤ p ≤ r - b    p = b/2 + (r - b) y        up to y = 1/2
 //   y(p) = 1 - y(r - p)                     p(y) = r - p(1 - y)
 
-#include "firmware/core/fixed_point.hpp"
+#include "firmware/core/arithmetic/fixed_point.hpp"
 
 namespace diastole::firmware {
 

@@ -7,7 +7,7 @@
 
 #include <cstdint>
 
-#include "firmware/core/fixed_point.hpp"
+#include "firmware/core/arithmetic/fixed_point.hpp"
 #include "protocol/wire/states.hpp"
 
 namespace diastole::firmware {

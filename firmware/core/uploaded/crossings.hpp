@@ -15,7 +15,7 @@
 
 #include <cstdint>
 
-#include "firmware/core/fixed_point.hpp"
+#include "firmware/core/arithmetic/fixed_point.hpp"
 #include "firmware/core/uploaded/knot_cubic.hpp"
 #include "firmware/core/uploaded/waveform_store.hpp"
 

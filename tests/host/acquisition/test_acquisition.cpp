@@ -362,6 +362,17 @@ TEST(Acquisition, AnUnpluggedLineEndsTheRunAndSaysSo) {
   EXPECT_FALSE(runfile::assess(assembled.run).sound());
 }
 
+TEST(Acquisition, ALineThatIsUnpluggedBeforeTheStartLeavesNoRunAndTheReason) {
+  SessionOnDesk session(short_session);
+  session.run([&] {
+    session.desk.plugged = false;
+    return StopRequest::none;
+  });
+  EXPECT_EQ(session.outcome.end, "link_lost");
+  EXPECT_THAT(session.outcome.last_error, testing::HasSubstr("the pump stops by itself"));
+  EXPECT_THROW((void)session.assemble(), NothingRecorded);
+}
+
 TEST(Acquisition, ADiskThatFailsToFlushEndsTheRunAsJournalFailed) {
   SessionOnDesk session(short_session);
   session.flush = [](int) {

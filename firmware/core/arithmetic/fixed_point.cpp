@@ -1,4 +1,4 @@
-#include "firmware/core/fixed_point.hpp"
+#include "firmware/core/arithmetic/fixed_point.hpp"
 
 #include <bit>
 
