@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "estimator/explain/imaging/linear_evidence.hpp"
-#include "estimator/explain/verdict/chi_square.hpp"
+#include "estimator/inference/tail_probability.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -117,7 +117,7 @@ std::vector<InclusionGuess> search_inclusion(const InclusionLattice& lattice, do
     guess.inclusion.edge_width_mm = 2.0;
     // An inclusion saturates: its own strain vanishes as it stiffens.
     guess.inclusion.contrast = amount > 0.0 ? std::min(4.0, 1.0 + 1.5 * amount) : std::max(0.3, 1.0 + amount);
-    guess.p_value = std::min(1.0, distinct_places(volume_mm3) * chi_square_tail(gain, 1.0));
+    guess.p_value = std::min(1.0, distinct_places(volume_mm3) * inference::chi_square_tail(gain, 1.0));
   }
   if (best[1].gain > best[0].gain) std::swap(best[0], best[1]);
   return best;
