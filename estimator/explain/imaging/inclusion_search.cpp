@@ -7,6 +7,7 @@
 
 #include "estimator/explain/imaging/linear_evidence.hpp"
 #include "estimator/inference/tail_probability.hpp"
+#include "protocol/contract/angle.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -51,7 +52,7 @@ std::vector<Inclusion> places_in(const HermiteMesh& mesh) {
       places.push_back({.contrast = 2.0,
                         .radius_mm = std::hypot(X_mm[0], X_mm[1]),
                         .z_mm = X_mm[2],
-                        .theta_deg = std::atan2(X_mm[1], X_mm[0]) * 180.0 / std::numbers::pi,
+                        .theta_deg = std::atan2(X_mm[1], X_mm[0]) / rad_per_deg,
                         .semi_axes_mm = {guessed_axis_mm, guessed_axis_mm, guessed_axis_mm},
                         .edge_width_mm = 4.0});
     }
