@@ -11,6 +11,7 @@
 #include "estimator/cli/page_and_record.hpp"
 #include "estimator/imaging/flow/flow_files.hpp"
 #include "estimator/imaging/flow/flow_session.hpp"
+#include "estimator/inference/intervals.hpp"
 #include "estimator/io/finding_json.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "estimator/report/page.hpp"
@@ -22,6 +23,7 @@ namespace diastole {
 namespace {
 
 namespace fs = std::filesystem;
+using inference::normal_95;
 
 struct FlowArguments {
   imaging::FlowSessionRequest session;
@@ -33,13 +35,10 @@ struct FlowArguments {
   bool force = false;
 };
 
-/// The 97.5th percentile of a normal variable.
-constexpr double z95 = 1.96;
-
 Json with_interval(const imaging::ValueWithError& value) {
   return {{"value", value.value},
           {"se", value.sigma},
-          {"ci95", {value.value - z95 * value.sigma, value.value + z95 * value.sigma}}};
+          {"ci95", {value.value - normal_95 * value.sigma, value.value + normal_95 * value.sigma}}};
 }
 
 Json background_json(const imaging::FlowMeasurement& flow) {
@@ -107,7 +106,7 @@ Json to_json(const imaging::FlowSession& session, double seconds) {
 
 std::string value_with_error(const imaging::ValueWithError& value, const char* unit) {
   return fmt::format("{:.3f} {} (95 % interval {:.3f} to {:.3f})", value.value, unit,
-                     value.value - z95 * value.sigma, value.value + z95 * value.sigma);
+                     value.value - normal_95 * value.sigma, value.value + normal_95 * value.sigma);
 }
 
 void print_for_people(const imaging::FlowSession& session, double seconds) {

@@ -14,6 +14,7 @@
 #include "estimator/imaging/geometry/ventricle_files.hpp"
 #include "estimator/imaging/geometry/ventricle_record.hpp"
 #include "estimator/imaging/geometry/ventricle_session.hpp"
+#include "estimator/inference/intervals.hpp"
 #include "estimator/io/finding_json.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "estimator/report/page.hpp"
@@ -36,12 +37,10 @@ struct VentricleArguments {
   bool force = false;
 };
 
-/// The 97.5th percentile of a normal variable.
-constexpr double normal_975 = 1.96;
-
 Json interval_of(double value, double sigma) {
-  return {
-      {"value", value}, {"se", sigma}, {"ci95", {value - normal_975 * sigma, value + normal_975 * sigma}}};
+  return {{"value", value},
+          {"se", sigma},
+          {"ci95", {value - inference::normal_95 * sigma, value + inference::normal_95 * sigma}}};
 }
 
 Json coordinates(const Eigen::Vector3d& x) { return {x.x(), x.y(), x.z()}; }

@@ -2,14 +2,14 @@
 
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "estimator/effects/effect.hpp"
+#include "protocol/contract/angle.hpp"
 
 namespace diastole {
 
 double Inclusion::stiffness(const std::array<double, 3>& X_mm) const {
-  const double theta = theta_deg * std::numbers::pi / 180.0;
+  const double theta = theta_deg * rad_per_deg;
   const std::array<double, 3> from_centre{
       (X_mm[0] * std::cos(theta) + X_mm[1] * std::sin(theta) - radius_mm) / semi_axes_mm[0],
       (X_mm[1] * std::cos(theta) - X_mm[0] * std::sin(theta)) / semi_axes_mm[1],

@@ -6,7 +6,8 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
-#include <numbers>
+
+#include "protocol/contract/angle.hpp"
 
 namespace diastole::expressions {
 namespace {
@@ -40,7 +41,7 @@ constexpr std::array known_units{Named{"m", {1, 0, 0, 0}, 100.0},
                                  Named{"J", {2, 1, -2, 0}, 1000.0},
                                  Named{"rad", {0, 0, 0, 0}, 1.0},
                                  Named{"cycle", {0, 0, 0, 0}, 1.0},
-                                 Named{"deg", {0, 0, 0, 0}, std::numbers::pi / 180.0},
+                                 Named{"deg", {0, 0, 0, 0}, rad_per_deg},
                                  Named{"ppm", {0, 0, 0, 0}, 1e-6},
                                  Named{"%", {0, 0, 0, 0}, 1e-2}};
 

@@ -1,7 +1,6 @@
 #include "estimator/fit/considered_errors.hpp"
 
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 #include <utility>
 
@@ -10,13 +9,12 @@
 #include "estimator/mesh/nodal_lines.hpp"
 #include "estimator/mesh/node_field.hpp"
 #include "estimator/mesh/placed_mesh.hpp"
+#include "protocol/contract/angle.hpp"
 
 namespace diastole {
 namespace {
 
 using Eigen::Vector3d;
-
-constexpr double radians = std::numbers::pi / 180.0;
 
 /// The point itself, or one within its element where it lies on a collapsed edge, on which the wall has no direction.
 MaterialPoint beside_collapse(const HermiteMesh& mesh, MaterialPoint point) {
@@ -41,7 +39,7 @@ ConsideredError turned_fibres(const ElasticModel& model, double sigma_deg, Turn 
                                                  const HermiteMesh& mesh, const MaterialPoint& point) {
               const MaterialAxes untouched = axes(mesh, point);
               return MaterialAxes(turn(wall_axes(mesh, point), untouched, between_nodes(mesh, depths, point),
-                                       radians * amount_deg)
+                                       rad_per_deg * amount_deg)
                                       .toRotationMatrix() *
                                   untouched);
             };

@@ -7,6 +7,7 @@
 #include "estimator/fit/fit_errors.hpp"
 #include "estimator/fit/usable_points.hpp"
 #include "estimator/inference/profile.hpp"
+#include "protocol/signal/quantile.hpp"
 
 namespace diastole {
 namespace {
@@ -142,13 +143,10 @@ FittedPosterior summarised(const std::vector<Eigen::MatrixXd>& chains, Eigen::In
     sorted.insert(sorted.end(), values.begin(), values.end());
   }
   std::sort(sorted.begin(), sorted.end());
-  const auto quantile = [&](double share) {
-    return sorted[static_cast<size_t>(share * static_cast<double>(sorted.size() - 1) + 0.5)];
-  };
   const Eigen::Map<const Eigen::ArrayXd> all(sorted.data(), static_cast<Eigen::Index>(sorted.size()));
   return {all.mean(),
           std::sqrt((all - all.mean()).square().sum() / static_cast<double>(all.size() - 1)),
-          {quantile(0.025), quantile(0.975)},
+          {signal::quantile_of_sorted(sorted, 0.025), signal::quantile_of_sorted(sorted, 0.975)},
           split_r_hat(draws),
           effective_sample_size(draws)};
 }

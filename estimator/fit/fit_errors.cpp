@@ -4,12 +4,12 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numbers>
 
 #include "estimator/fit/offset_score.hpp"
 #include "estimator/inference/covariance.hpp"
 #include "estimator/inference/deleted_residual.hpp"
 #include "estimator/inference/intervals.hpp"
+#include "estimator/inference/tail_probability.hpp"
 
 namespace diastole {
 namespace {
@@ -151,7 +151,7 @@ struct StepMixture {
   [[nodiscard]] double share_below(double x) const {
     double share = 0;
     for (size_t k = 0; k < weights.size(); ++k)
-      share += weights[k] * 0.5 * std::erfc((means[k] - x) / (deviations[k] * std::numbers::sqrt2));
+      share += weights[k] * inference::normal_tail((means[k] - x) / deviations[k]);
     return share;
   }
   [[nodiscard]] double quantile(double share) const {

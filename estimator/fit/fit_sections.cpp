@@ -10,6 +10,7 @@
 #include "estimator/mesh/local_field.hpp"
 #include "estimator/motion_residuals/tag_match.hpp"
 #include "estimator/solution/body_section.hpp"
+#include "protocol/contract/angle.hpp"
 
 namespace diastole {
 namespace {
@@ -146,7 +147,7 @@ Cut cut_across(const Measurement& measurement, int frame) {
 
 Cut cut_along(const Measurement& measurement, int frame) {
   const Eigen::Vector3d direction = along_direction(measurement, frame);
-  const double angle_deg = std::atan2(direction[1], direction[0]) * 180 / M_PI;
+  const double angle_deg = std::atan2(direction[1], direction[0]) / rad_per_deg;
   return {.title = fmt::format("Along the axis, {:.0f}° from x", angle_deg),
           .horizontal = "distance from the axis (mm)",
           .vertical = "z (mm)",

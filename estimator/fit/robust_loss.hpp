@@ -29,7 +29,7 @@ struct RobustLoss {
   [[nodiscard]] double influence_slope(double r) const;
 };
 
-/// Standard deviation of the residuals' core, 1.4826 times the median of |r|.
+/// Standard deviation of the residuals' core: signal::deviation_of_normal of |r|.
 double core_deviation(const Eigen::VectorXd& residuals);
 
 /// How many residuals lie beyond five standard deviations, stated and of the core: chance makes one in two million.

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 
 namespace diastole::inference {
@@ -28,6 +29,13 @@ Eigen::MatrixXd information_of_covariance(const Eigen::MatrixXd& covariance) {
   const Eigen::MatrixXd inverse = of_known.ldlt().solve(Eigen::MatrixXd::Identity(count, count));
   information(known, known) = inverse;
   return information;
+}
+
+double separation(const Eigen::MatrixXd& gram, const Eigen::MatrixXd& known) {
+  const Eigen::Index count = gram.rows() - 1;
+  const Eigen::VectorXd g = gram.block(1, 0, count, 1);
+  const Eigen::MatrixXd normal = gram.block(1, 1, count, count) + known;
+  return std::sqrt(std::max(0.0, gram(0, 0) - g.dot(normal.ldlt().solve(g))));
 }
 
 }  // namespace diastole::inference

@@ -11,4 +11,11 @@ Covariance covariance_of_information(const Eigen::MatrixXd& information);
 /// What is known of unknowns of this covariance by themselves: zero for those of infinite variance.
 Eigen::MatrixXd information_of_covariance(const Eigen::MatrixXd& covariance);
 
+/// How far the residuals r stay from zero, in sigmas, once unknowns of which P is known beforehand adapt, r + K theta, to them:
+///
+///   d^2 = r'r - g' (K'K + P)^-1 g,   g = K'r
+///
+/// `gram` = [r K]' [r K]. Precondition: K'K + P is positive definite.
+double separation(const Eigen::MatrixXd& gram, const Eigen::MatrixXd& known);
+
 }  // namespace diastole::inference

@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "estimator/io/number_table.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "estimator/shear/shear_test.hpp"
+#include "protocol/contract/angle.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/text.hpp"
 
@@ -17,7 +17,6 @@ namespace diastole {
 namespace {
 
 constexpr std::string_view fibre_column = "fibre_deg";
-constexpr double rad_per_degree = std::numbers::pi / 180;
 constexpr size_t fewest_readings = 3;
 constexpr double least_stretch = 0.05,
                  most_stretch = 20;  // beyond them nothing incompressible was ever tested
@@ -94,7 +93,7 @@ double fibre_rad_of(const NumberTable& table, size_t row, size_t column, const T
                fmt::format("a fibre at {} degrees to the pull: the specimen would shear", fibre_deg),
                "Pull along the fibre (0) or across it (90), or give a biaxial test.");
   }
-  return fibre_deg * rad_per_degree;
+  return fibre_deg * rad_per_deg;
 }
 
 void measure_channels(BenchTest& test) {
@@ -129,7 +128,7 @@ BenchTest of_rotational_shear(std::string_view text, const std::string& file, co
   for (const ShearRow& row : shear_test_from_text(text, file).rows) {
     test.readings.push_back({{row.annulus.inner_radius_mm, row.annulus.outer_radius_mm, row.annulus.height_mm,
                               row.moment_Nmm, row.radius_mm},
-                             {row.rotation_rad / rad_per_degree}});
+                             {row.rotation_rad / rad_per_deg}});
   }
   return test;
 }

@@ -6,6 +6,8 @@
 #include <numbers>
 #include <vector>
 
+#include "protocol/contract/angle.hpp"
+
 namespace diastole {
 namespace {
 
@@ -17,7 +19,6 @@ using Controls = std::span<const double>;
 using Predicted = std::optional<MatrixXd>;
 
 constexpr double N_per_kPa_mm2 = 1e-3;
-constexpr double rad_per_deg = pi / 180;
 
 Matrix3d stretched(double first, double second) {
   return Eigen::Vector3d(first, second, 1 / (first * second)).asDiagonal();

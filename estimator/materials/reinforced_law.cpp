@@ -4,8 +4,9 @@
 #include <map>
 #include <memory>
 #include <mutex>
-#include <numbers>
 #include <string>
+
+#include "protocol/contract/angle.hpp"
 
 namespace diastole {
 namespace {
@@ -13,7 +14,6 @@ namespace {
 using Tensor = SymmetricTensor<double>;
 using Values = std::span<const double>;
 
-constexpr double radians = std::numbers::pi / 180.0;
 constexpr size_t own_parameters = 3;
 
 /// What the added fibres do at one C.
@@ -21,8 +21,8 @@ struct Fibres {
   Fibres(const Tensor& c, Values values)
       : k1(values[0]),
         k2(values[1]),
-        cosine(std::cos(radians * values[2])),
-        sine(std::sin(radians * values[2])) {
+        cosine(std::cos(rad_per_deg * values[2])),
+        sine(std::sin(rad_per_deg * values[2])) {
     stretch = cosine * cosine * c[0] + sine * sine * c[1] + 2.0 * cosine * sine * c[3] - 1.0;
     growth = std::exp(k2 * stretch * stretch);
   }
@@ -123,8 +123,8 @@ class ReinforcedLaw final : public Law {
         add(slope, fibres.tension() * fibres.stretch * fibres.stretch, fibres.direction());
         break;
       default:
-        add(slope, 0.5 * radians * fibres.stiffness() * fibres.stretch_by_angle(c), fibres.direction());
-        add(slope, radians * fibres.tension(), fibres.turn());
+        add(slope, 0.5 * rad_per_deg * fibres.stiffness() * fibres.stretch_by_angle(c), fibres.direction());
+        add(slope, rad_per_deg * fibres.tension(), fibres.turn());
     }
     return slope;
   }

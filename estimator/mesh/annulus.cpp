@@ -5,11 +5,10 @@
 #include <utility>
 
 #include "estimator/mesh/structured.hpp"
+#include "protocol/contract/angle.hpp"
 
 namespace diastole {
 namespace {
-
-constexpr double rad_per_deg = std::numbers::pi / 180.0;
 
 /// A coordinate along one element direction at a node, and its derivative with respect to that xi.
 struct Ordinate {

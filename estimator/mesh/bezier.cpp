@@ -33,9 +33,15 @@ BezierField bezier_of(const ElementField& hermite) {
   return control;
 }
 
-Eigen::MatrixXd bezier_through(const std::array<double, 4>& at, const Eigen::MatrixXd& values) {
+Eigen::MatrixXd bezier_through(const std::array<double, 4>& at,
+                               const std::function<Eigen::VectorXd(const Xi&)>& sample) {
+  Eigen::MatrixXd result;
+  for (size_t q = 0; q < bezier_points; ++q) {
+    const Eigen::VectorXd numbers = sample({at[q & 3], at[(q >> 2) & 3], at[q >> 4]});
+    if (q == 0) result.resize(bezier_points, numbers.size());
+    result.row(static_cast<Eigen::Index>(q)) = numbers;
+  }
   const Eigen::Matrix4d inverse = bernstein_at(at).inverse();
-  Eigen::MatrixXd result = values;
   for (size_t k = 0; k < 3; ++k) {
     const Eigen::MatrixXd before = result;
     const size_t stride = size_t{1} << (2 * k);

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <map>
 #include <memory>
-#include <numbers>
 #include <optional>
 #include <set>
 #include <tuple>
@@ -15,6 +14,7 @@
 
 #include "estimator/mesh/exfile_lines.hpp"
 #include "estimator/mesh/face_map.hpp"
+#include "protocol/contract/angle.hpp"
 
 namespace diastole {
 namespace {
@@ -425,7 +425,7 @@ class MeshBuilder {
     for (const size_t number : numbers_) {
       const ExNode& node = nodes_.at(number);
       if (!node.header->fibre) return {};
-      angles_deg.push_back(node.numbers[*node.header->fibre] * 180.0 / std::numbers::pi);
+      angles_deg.push_back(node.numbers[*node.header->fibre] / rad_per_deg);
     }
     return FibreField(std::move(angles_deg));
   }

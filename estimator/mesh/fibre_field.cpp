@@ -1,17 +1,12 @@
 #include "estimator/mesh/fibre_field.hpp"
 
 #include <Eigen/Geometry>
-#include <numbers>
 #include <utility>
 
 #include "estimator/mesh/nodal_lines.hpp"
+#include "protocol/contract/angle.hpp"
 
 namespace diastole {
-namespace {
-
-double radians(double deg) { return std::numbers::pi / 180.0 * deg; }
-
-}  // namespace
 
 Eigen::Matrix3d wall_axes(const HermiteMesh& mesh, const MaterialPoint& point) {
   const Eigen::Matrix3d tangents = mesh.xi_gradient(mesh.reference(), point);
@@ -44,9 +39,9 @@ Eigen::Matrix3d FibreField::material_axes(const HermiteMesh& mesh, const Materia
   using Eigen::Vector3d;
   const double sheet_deg = sheet_deg_.empty() ? 0.0 : between_nodes(mesh, sheet_deg_, point);
   const double transverse_deg = transverse_deg_.empty() ? 0.0 : between_nodes(mesh, transverse_deg_, point);
-  return wall_axes(mesh, point) * AngleAxisd(radians(fibre_deg(mesh, point)), Vector3d::UnitZ()) *
-         AngleAxisd(radians(-transverse_deg), Vector3d::UnitY()) *
-         AngleAxisd(radians(sheet_deg), Vector3d::UnitX());
+  return wall_axes(mesh, point) * AngleAxisd(fibre_deg(mesh, point) * rad_per_deg, Vector3d::UnitZ()) *
+         AngleAxisd(-transverse_deg * rad_per_deg, Vector3d::UnitY()) *
+         AngleAxisd(sheet_deg * rad_per_deg, Vector3d::UnitX());
 }
 
 }  // namespace diastole

@@ -13,13 +13,13 @@
 #include "estimator/mesh/helix_course.hpp"
 #include "estimator/mesh/nodal_lines.hpp"
 #include "estimator/mesh/point_locator.hpp"
+#include "protocol/contract/angle.hpp"
 
 namespace diastole {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
 constexpr size_t least_points = 8;
-constexpr double usual_bend_rad = 10 * degree;
+constexpr double usual_bend_rad = 10 * rad_per_deg;
 constexpr int most_iterations = 20;
 constexpr double settled_rad = 1e-9;
 
@@ -41,7 +41,7 @@ std::vector<Seen> seen_in(const HermiteMesh& mesh, std::span<const FibrePoint> p
     const Eigen::Matrix3d wall = wall_axes(mesh, located->point);
     if (!wall.allFinite()) continue;  // on the apex
     Seen seen{located->point.element, trilinear_basis(located->point.xi), 0,
-              wall.transpose() * point.direction.normalized(), std::pow(point.sigma_deg * degree, -2)};
+              wall.transpose() * point.direction.normalized(), std::pow(point.sigma_deg * rad_per_deg, -2)};
     for (size_t c = 0; c < corners; ++c)
       seen.depth += seen.basis[c] * depths[mesh.element(seen.element)[c]];
     all.push_back(seen);
@@ -104,7 +104,7 @@ class NodalFit {
 std::vector<double> degrees(const Eigen::VectorXd& radians) {
   std::vector<double> all;
   for (const double value : radians)
-    all.push_back(value / degree);
+    all.push_back(value / rad_per_deg);
   return all;
 }
 
@@ -150,7 +150,7 @@ FibresThroughPoints fibres_through_points(const HermiteMesh& mesh, std::span<con
     const double alpha = fit.at(helix, point), gamma = fit.at(transverse, point);
     const Eigen::Vector3d f(std::cos(gamma) * std::cos(alpha), std::cos(gamma) * std::sin(alpha),
                             std::sin(gamma));
-    squares += std::pow(std::acos(std::min(1.0, std::abs(f.dot(point.direction)))) / degree, 2);
+    squares += std::pow(std::acos(std::min(1.0, std::abs(f.dot(point.direction)))) / rad_per_deg, 2);
   }
   return {FibreField(degrees(helix), {}, degrees(transverse)), seen.size(),
           std::sqrt(squares / static_cast<double>(seen.size()))};

@@ -4,20 +4,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "estimator/io/study_refusal.hpp"
 #include "estimator/model/changed_specimen.hpp"
 #include "estimator/model/inclusion_stiffness.hpp"
 #include "estimator/model/study_effects.hpp"
 #include "estimator/model/study_model.hpp"
+#include "protocol/contract/angle.hpp"
 
 namespace diastole {
 namespace {
 
 /// Fibres on cylinders about z, at an angle from the circumference towards z.
 MaterialAxesField helical_axes(double angle_deg) {
-  const double angle = angle_deg * std::numbers::pi / 180.0;
+  const double angle = angle_deg * rad_per_deg;
   return [angle](const HermiteMesh& mesh, const MaterialPoint& point) {
     const Eigen::Vector3d X_mm = mesh.value(mesh.reference(), point);
     const Eigen::Vector3d outwards = Eigen::Vector3d(X_mm[0], X_mm[1], 0.0).normalized();

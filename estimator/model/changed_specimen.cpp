@@ -3,20 +3,18 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <numbers>
 
 #include "estimator/io/study_refusal.hpp"
 #include "estimator/materials/reinforced_law.hpp"
 #include "estimator/mesh/nodal_lines.hpp"
 #include "estimator/model/study_effects.hpp"
+#include "protocol/contract/angle.hpp"
 
 namespace diastole {
 namespace {
 
 using Eigen::AngleAxisd;
 using Eigen::Vector3d;
-
-constexpr double radians = std::numbers::pi / 180.0;
 
 /// G along the circumference, by the depth in the wall.
 double residual_stretch(const HermiteMesh& mesh, const MaterialPoint& point, double depth, double by_xi3,
@@ -83,7 +81,7 @@ ElasticModel ChangeableSpecimen::with(const FieldModel& change, const SolveOptio
       MaterialAxes axes = fibres ? fibres(mesh, point) : MaterialAxes(wall);
       if (turned) {
         const double angle =
-            radians * (change.fibre_turn_deg + change.fibre_course_deg * (1.0 - 2.0 * depth));
+            rad_per_deg * (change.fibre_turn_deg + change.fibre_course_deg * (1.0 - 2.0 * depth));
         axes = AngleAxisd(angle, wall.col(2)).toRotationMatrix() * axes;
       }
       if (change.opening_angle_deg != 0.0) {

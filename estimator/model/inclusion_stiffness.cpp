@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "protocol/contract/angle.hpp"
 
 namespace diastole {
 
@@ -34,7 +35,7 @@ InclusionStiffness::InclusionStiffness(const HermiteMesh& mesh) : samples_(mesh.
 }
 
 GaussNumbers InclusionStiffness::of(const Inclusion& inclusion) const {
-  const double theta = inclusion.theta_deg * std::numbers::pi / 180.0;
+  const double theta = inclusion.theta_deg * rad_per_deg;
   const Eigen::Vector3d centre_mm(inclusion.radius_mm * std::cos(theta),
                                   inclusion.radius_mm * std::sin(theta), inclusion.z_mm);
   // Where the edge's hyperbolic tangent has ended.

@@ -4,17 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "estimator/io/study_refusal.hpp"
 #include "estimator/model/affected_model.hpp"
 #include "estimator/model/study_model.hpp"
+#include "protocol/contract/angle.hpp"
 
 namespace diastole {
 namespace {
-
-constexpr double degrees = 180.0 / std::numbers::pi;
 
 /// Fibre, sheet and transverse angle of material axes along a wall's axes (mesh/fibre_field.hpp).
 Eigen::Vector3d angles_deg(const Eigen::Matrix3d& wall, const MaterialAxes& axes) {
@@ -24,7 +22,7 @@ Eigen::Vector3d angles_deg(const Eigen::Matrix3d& wall, const MaterialAxes& axes
   const Eigen::Matrix3d unturned = wall * Eigen::AngleAxisd(alpha, Eigen::Vector3d::UnitZ()) *
                                    Eigen::AngleAxisd(-gamma, Eigen::Vector3d::UnitY());
   const Eigen::Vector3d sheet = unturned.transpose() * axes.col(1);
-  return degrees * Eigen::Vector3d(alpha, std::atan2(sheet[2], sheet[1]), gamma);
+  return Eigen::Vector3d(alpha, std::atan2(sheet[2], sheet[1]), gamma) / rad_per_deg;
 }
 
 /// A corner, or a place beside it where the wall has no direction (a collapsed edge).
@@ -124,7 +122,7 @@ UnloadedBody unloaded_body(const UnloadedModel& unloaded) {
       const MaterialPoint point{e, xi};
       const double cosine =
           axes(mesh, point).col(0).dot(result.body.fibres->material_axes(mesh, point).col(0));
-      squares += std::pow(degrees * std::acos(std::min(1.0, std::abs(cosine))), 2);
+      squares += std::pow(std::acos(std::min(1.0, std::abs(cosine))) / rad_per_deg, 2);
     }
   }
   result.fibre_rms_deg = std::sqrt(squares / static_cast<double>(gauss_points * mesh.element_count()));

@@ -16,6 +16,7 @@
 #include "estimator/model/affected_model.hpp"
 #include "estimator/model/study_model.hpp"
 #include "estimator/montecarlo/synthetic_data.hpp"
+#include "protocol/contract/angle.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
@@ -39,7 +40,7 @@ std::vector<Slice> slices_of(const ImagingPlan& plan) {
   for (const double z_mm : plan.short_axis_mm)
     slices.push_back({z_mm * Vector3d::UnitZ(), Vector3d::UnitX(), Vector3d::UnitY()});
   for (const double angle_deg : plan.long_axis_deg) {
-    const double angle = angle_deg * std::numbers::pi / 180;
+    const double angle = angle_deg * rad_per_deg;
     slices.push_back({Vector3d::Zero(), {std::cos(angle), std::sin(angle), 0}, -Vector3d::UnitZ()});
   }
   return slices;
@@ -190,7 +191,7 @@ Measurement planned_tags(const HermiteMesh& mesh, const ImagingPlan& plan, const
   const int reach = static_cast<int>(std::ceil(mesh.extent_mm() / step_mm));
   for (const Slice& slice : slices_of(plan)) {
     for (const double angle_deg : plan.tag_angles_deg) {
-      const double angle = angle_deg * std::numbers::pi / 180;
+      const double angle = angle_deg * rad_per_deg;
       const Vector3d normal = std::cos(angle) * slice.along_row + std::sin(angle) * slice.along_column;
       const Vector3d along = std::cos(angle) * slice.along_column - std::sin(angle) * slice.along_row;
       for (int line = -reach; line <= reach; ++line) {

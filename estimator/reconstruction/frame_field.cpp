@@ -226,7 +226,7 @@ double robust_spread(std::vector<double> values) {
   if (values.empty()) return 0.0;
   for (double& value : values)
     value = std::abs(value);
-  return signal::median(std::move(values)) / 0.6745;
+  return signal::deviation_of_normal(std::move(values));
 }
 
 FrameField reconstruct_frame(const FieldForms& forms, const Measurement& measurement, int frame,

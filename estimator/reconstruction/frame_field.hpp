@@ -76,7 +76,7 @@ FrameField reconstruct_frame(const FieldForms& forms, const Measurement& measure
 /// Of the highest pressure: in images of a whole cycle the last frame is nearly at rest.
 const FrameField& most_loaded(const std::vector<FrameField>& fields);
 
-/// Median absolute value / 0.6745: the standard deviation of normal numbers, blind to a few wild ones.
+/// Standard deviation of normal numbers about zero, blind to a few wild ones (signal::deviation_of_normal); 0 of none.
 double robust_spread(std::vector<double> values);
 
 }  // namespace diastole

@@ -12,6 +12,7 @@
 #include "estimator/motion_residuals/tag_match.hpp"
 #include "estimator/reconstruction/frame_field.hpp"
 #include "protocol/signal/median.hpp"
+#include "protocol/signal/quantile.hpp"
 
 namespace diastole {
 namespace {
@@ -53,10 +54,7 @@ void check_lengths(Findings& findings, const std::vector<Vector3d>& places, cons
   std::vector<double> distances;
   for (const Vector3d& place : places)
     distances.push_back(place.norm());
-  const auto most =
-      distances.begin() + static_cast<std::ptrdiff_t>(0.98 * static_cast<double>(distances.size()));
-  std::nth_element(distances.begin(), most, distances.end());
-  const double reach_mm = *most;
+  const double reach_mm = signal::quantile(std::move(distances), 0.98);
   const double expected_mm = body.reach_mm + body.centre_mm.norm();
   const double ratio = reach_mm / expected_mm;
   if (ratio > 0.4 && ratio < 2.5) return;

@@ -210,11 +210,11 @@ BezierGrid reconstruction_grid(const StudyReconstruction& all) {
     GridArray displacement{"displacement_mm", 3, {}}, volume{"volume_ratio", 1, {}};
     for (size_t e = 0; e < mesh.element_count(); ++e) {
       append_in_vtk_order(bezier_of(mesh.gather(e, field.displacement_mm)).transpose(), displacement.values);
-      Eigen::MatrixXd ratios(gauss_points, 1);
-      for (size_t q = 0; q < gauss_points; ++q)
-        ratios(static_cast<Eigen::Index>(q), 0) =
-            mesh.reference_gradient(field.position_mm, {e, gauss_tables().xi[q]}).determinant();
-      append_in_vtk_order(bezier_through(places, ratios), volume.values);
+      const auto ratio = [&](const Xi& xi) -> Eigen::VectorXd {
+        return Eigen::VectorXd::Constant(1,
+                                         mesh.reference_gradient(field.position_mm, {e, xi}).determinant());
+      };
+      append_in_vtk_order(bezier_through(places, ratio), volume.values);
     }
     grid.steps.push_back({field.load.time_s,
                           {std::move(displacement), std::move(volume)},

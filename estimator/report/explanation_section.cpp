@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 
 #include "estimator/effects/effect.hpp"
 #include "estimator/explain/verdict/verdict.hpp"
@@ -14,6 +13,7 @@
 #include "estimator/report/sections.hpp"
 #include "estimator/report/svg_plot.hpp"
 #include "estimator/report/trace_views.hpp"
+#include "protocol/contract/angle.hpp"
 
 namespace diastole::report {
 namespace {
@@ -143,7 +143,7 @@ std::vector<std::array<double, 3>> inclusions_mm(const Explanation& explanation)
     for (const FoundParameter& parameter : effect.parameters)
       value[parameter.name] = parameter.value;
     if (!value.contains("radius_mm") || !value.contains("z_mm") || !value.contains("theta_deg")) continue;
-    const double theta = value["theta_deg"] * std::numbers::pi / 180.0;
+    const double theta = value["theta_deg"] * rad_per_deg;
     places.push_back(
         {value["radius_mm"] * std::cos(theta), value["radius_mm"] * std::sin(theta), value["z_mm"]});
   }

@@ -10,6 +10,7 @@
 #include <span>
 
 #include "estimator/report/html_text.hpp"
+#include "protocol/contract/angle.hpp"
 
 namespace diastole::report {
 namespace {
@@ -141,9 +142,7 @@ void fill(FieldView& view, size_t rows, const Misfits& misfits, const PlaceOf& p
   }
 }
 
-double degrees_of(const Place& place_mm) {
-  return std::atan2(place_mm[1], place_mm[0]) * 180.0 / std::numbers::pi;
-}
+double degrees_of(const Place& place_mm) { return std::atan2(place_mm[1], place_mm[0]) / rad_per_deg; }
 
 FieldView unrolled(size_t layer, const Wall& wall, const Misfits& misfits,
                    const std::vector<Place>& marked_mm) {

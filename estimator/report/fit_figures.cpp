@@ -8,6 +8,7 @@
 #include <numeric>
 #include <string>
 
+#include "estimator/inference/intervals.hpp"
 #include "estimator/report/colour_scale.hpp"
 #include "estimator/report/html_text.hpp"
 #include "estimator/report/svg_plot.hpp"
@@ -98,7 +99,8 @@ Figure values_by_number(const FittedParameter& parameter) {
   std::vector<double> index(parameter.elements.size());
   std::iota(index.begin(), index.end(), 0.0);
   const auto value = numbers_of(parameter.elements, &FittedElement::value);
-  const auto error = numbers_of(parameter.elements, [](const auto& element) { return 1.96 * element.se; });
+  const auto error =
+      numbers_of(parameter.elements, [](const auto& element) { return inference::normal_95 * element.se; });
   plot.error_bars(index, value, error, "a");
   plot.points(index, value, "a", "value and 95 % interval of each element");
   return {plot.svg(), "Regional values, one an element."};

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "estimator/inference/intervals.hpp"
 #include "estimator/report/bitmap.hpp"
 #include "estimator/report/html_text.hpp"
 #include "estimator/report/sections.hpp"
@@ -11,7 +12,7 @@
 namespace diastole::report {
 namespace {
 
-constexpr double z95 = 1.96;
+using inference::normal_95;
 
 /// One dimension of a band of 95 %.
 std::vector<double> shifted(const std::vector<double>& values, const std::vector<double>& sigmas, double z) {
@@ -24,12 +25,12 @@ std::vector<double> shifted(const std::vector<double>& values, const std::vector
 SvgPlot curve_plot(const FlowRecord& flow, const std::vector<double>& curve, const std::vector<double>& sigma,
                    const char* label, const std::vector<double>& points, const std::vector<double>& errors) {
   SvgPlot plot({.x = {.label = "time after the trigger (s)"}, .y = {.label = label}});
-  plot.band(flow.time_s, shifted(curve, sigma, -z95), shifted(curve, sigma, z95), "a", "95 %");
+  plot.band(flow.time_s, shifted(curve, sigma, -normal_95), shifted(curve, sigma, normal_95), "a", "95 %");
   plot.line(flow.time_s, curve, "a");
   const std::vector<double> times = numbers_of(flow.phases, &FlowPhaseRecord::phase_s);
   std::vector<double> bars = errors;
   for (double& bar : bars)
-    bar *= z95;
+    bar *= normal_95;
   plot.error_bars(times, points, bars, "b");
   plot.points(times, points, "b small", "image phases");
   return plot;
@@ -43,11 +44,11 @@ SvgPlot loop_plot(const FlowRecord& flow) {
   SvgPlot plot({.x = {.label = "volume above its least (mL)"}, .y = {.label = "cavity pressure (kPa)"}});
   std::vector<double> bars = sigma_kPa;
   for (double& bar : bars)
-    bar *= z95;
+    bar *= normal_95;
   plot.error_bars(volume, pressure, bars, "muted");
   for (const LoopPointRecord& point : flow.loop) {
-    const std::vector<double> across{point.volume_mL - z95 * point.volume_sigma_mL,
-                                     point.volume_mL + z95 * point.volume_sigma_mL};
+    const std::vector<double> across{point.volume_mL - normal_95 * point.volume_sigma_mL,
+                                     point.volume_mL + normal_95 * point.volume_sigma_mL};
     plot.line(across, std::vector<double>{point.pressure_kPa, point.pressure_kPa}, "muted thin");
   }
   volume.push_back(volume.front());
@@ -67,7 +68,7 @@ SvgPlot stiffness_plot(const FlowRecord& flow) {
     if (std::isnan(stiffness[i])) continue;
     known_s.push_back(time[i]);
     known.push_back(stiffness[i]);
-    bars.push_back(z95 * sigma[i]);
+    bars.push_back(normal_95 * sigma[i]);
   }
   plot.error_bars(known_s, known, bars, "muted");
   plot.line(time, stiffness, "c");
@@ -102,8 +103,8 @@ std::string strip(const FlowRecord& flow, std::string FlowImageRecord::*picture)
 }
 
 std::string interval(double value, double sigma, const char* unit) {
-  return fmt::format("95 % interval {} to {} {}", number(value - z95 * sigma), number(value + z95 * sigma),
-                     unit);
+  return fmt::format("95 % interval {} to {} {}", number(value - normal_95 * sigma),
+                     number(value + normal_95 * sigma), unit);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "estimator/inference/intervals.hpp"
 #include "estimator/report/html_text.hpp"
 #include "estimator/report/sections.hpp"
 #include "estimator/report/svg_plot.hpp"
@@ -9,13 +10,10 @@
 namespace diastole::report {
 namespace {
 
-/// The 97.5th percentile of a normal variable.
-constexpr double normal_975 = 1.96;
-
 SvgPlot volume_plot(const VentricleRecord& heart, const std::vector<double>& phase) {
   std::vector<double> bars = numbers_of(heart.phases, &VentriclePhaseRecord::cavity_sigma_mL);
   for (double& bar : bars)
-    bar *= normal_975;
+    bar *= inference::normal_95;
   const std::vector<double> cavity = numbers_of(heart.phases, &VentriclePhaseRecord::cavity_mL);
   SvgPlot plot({.x = {.label = "phase"}, .y = {.label = "volume (mL)"}});
   plot.error_bars(phase, cavity, bars, "a");

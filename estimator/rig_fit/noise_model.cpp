@@ -213,7 +213,7 @@ double common_cycle_sd(const std::vector<CycleChange>& changes) {
   std::vector<double> sizes;
   for (const CycleChange& change : changes)
     sizes.push_back(std::sqrt(change.square));
-  double variance = 0.5 * std::pow(signal::median(sizes) / 0.6745, 2);
+  double variance = 0.5 * std::pow(signal::deviation_of_normal(std::move(sizes)), 2);
   for (size_t round = 0; round < rounds; ++round) {
     double sum = 0.0;
     double weight = 0.0;

@@ -191,7 +191,6 @@ void set_noise(FeatureBlock& block, const ChannelNoise& noise, double cycle_sd, 
 /// 1/f wanders over a segment by some twice the variance that successive cycles show.
 void raise_noise_of_cycles(FeatureBlock& block, const Eigen::VectorXd& measured) {
   constexpr size_t enough = 6;
-  constexpr double of_normal = 1.4826;  // sd over the median size
   for (const double harmonic : {0.0, 1.0}) {
     std::vector<double> changes;
     double before = 0.0;
@@ -203,7 +202,7 @@ void raise_noise_of_cycles(FeatureBlock& block, const Eigen::VectorXd& measured)
       before = now;
     }
     if (changes.size() < enough) continue;
-    const double scatter = of_normal * signal::median(changes);
+    const double scatter = signal::deviation_of_normal(std::move(changes));
     for (Feature& feature : block.features)
       if (feature.kind != FeatureKind::repeats && feature.harmonic <= harmonic)
         feature.noise_sd = std::max(feature.noise_sd, scatter);

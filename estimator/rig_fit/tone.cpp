@@ -4,12 +4,12 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <mutex>
 #include <numbers>
 #include <vector>
 
+#include "estimator/inference/tail_probability.hpp"
 #include "estimator/rig_fit/segment_features.hpp"
 #include "protocol/signal/median.hpp"
 
@@ -150,7 +150,7 @@ std::optional<Tone> find_tone(const Session& session) {
       here.segment = window.segment;
     }
     if (2.0 * count < static_cast<double>(windows.size()) || 2.0 * clear < count) continue;
-    here.p_value = std::min(1.0, frequencies * boost::math::gamma_q(count, ratios));
+    here.p_value = std::min(1.0, frequencies * inference::chi_square_tail(2.0 * ratios, 2.0 * count));
     here.excess_chi2 = 2.0 * (ratios - count);
     here.rms_kPa = std::sqrt(std::max(0.0, square / rows));
     here.noise_kPa = std::sqrt(noise / rows);

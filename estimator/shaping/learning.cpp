@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <numbers>
 
 #include "estimator/shaping/model_fit.hpp"
+#include "protocol/contract/angle.hpp"
 
 namespace diastole::shaping {
 namespace {
@@ -156,7 +156,7 @@ void describe_harmonics(const Evidence& evidence, const std::vector<Posterior>& 
     LearnedHarmonic& harmonic = lesson.harmonics.emplace_back();
     harmonic.frequency_Hz = evidence.wanted_mL.frequency_Hz(k);
     harmonic.gain = std::abs(known[i].gain);
-    harmonic.phase_deg = std::arg(known[i].gain) * 180.0 / std::numbers::pi;
+    harmonic.phase_deg = std::arg(known[i].gain) / rad_per_deg;
     harmonic.gain_sd = known[i].gain_sd;
     harmonic.contraction_expected = known[i].gain_sd / std::hypot(harmonic.gain, known[i].gain_sd);
     if (runs < 2) continue;

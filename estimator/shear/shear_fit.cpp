@@ -10,14 +10,14 @@
 #include <set>
 
 #include "estimator/inference/intervals.hpp"
+#include "protocol/contract/angle.hpp"
 
 namespace diastole {
 namespace {
 
 using inference::student_quantile;
 
-constexpr double kPa_per_MPa = 1000;  // 1 MPa = 1 N/mm2
-constexpr double deg_per_rad = 180 / std::numbers::pi;
+constexpr double kPa_per_MPa = 1000;          // 1 MPa = 1 N/mm2
 constexpr double doubt = 0.05;                // of the interval, and of an outlier among all rows
 constexpr double strong_doubt = 0.001;        // of remarks that question the test itself
 constexpr double rounding = 1e-9;             // relative scatter below which only arithmetic is seen
@@ -73,7 +73,7 @@ void set_points(ShearFit& fit, const std::vector<ShearRow>& rows, double slope) 
   for (const ShearRow& row : rows) {
     const double a = row.annulus.inner_radius_mm;
     const double residual_deg =
-        deg_per_rad * (row.rotation_rad - row.moment_Nmm * slope * shape_per_mm3(row));
+        (row.rotation_rad - row.moment_Nmm * slope * shape_per_mm3(row)) / rad_per_deg;
     fit.points.push_back({row.rotation_rad / row.moment_Nmm * 1e3, shape_per_mm3(row) * 1e6, residual_deg});
     squares += residual_deg * residual_deg;
     const double shear =

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <span>
 
 #include "estimator/io/number_table.hpp"
 #include "estimator/io/whole_file.hpp"
+#include "protocol/contract/angle.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/text.hpp"
 
@@ -85,8 +85,7 @@ ShearRow row_of(const NumberTable& table, size_t row, const Form& form) {
     table.fail(row, load + 2, fmt::format("a rotation of {} degrees is beyond half a turn", rotation_deg),
                "Give the rotation from the unloaded state in degrees, between -180 and 180.");
   }
-  return {annulus, lever * table.at(row, load), radius_mm, rotation_deg * std::numbers::pi / half_turn_deg,
-          row + 2};
+  return {annulus, lever * table.at(row, load), radius_mm, rotation_deg * rad_per_deg, row + 2};
 }
 
 }  // namespace

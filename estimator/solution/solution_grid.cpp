@@ -22,20 +22,10 @@ GridStep step_of(const ElasticModel& model, const SolvedFrame& frame) {
   for (size_t e = 0; e < mesh.element_count(); ++e) {
     const ElementField moved = mesh.gather(e, frame.state.position_mm) - mesh.gather(e, mesh.reference());
     append_in_vtk_order(bezier_of(moved).transpose(), displacement.values);
-    Eigen::MatrixXd samples;
-    for (size_t q = 0; q < gauss_points; ++q) {
-      const Eigen::VectorXd row =
-          sampled_fields(point_fields(system, frame.state, {e, gauss_tables().xi[q]}));
-      if (q == 0) samples.resize(gauss_points, row.size());
-      samples.row(static_cast<Eigen::Index>(q)) = row;
-    }
-    const Eigen::MatrixXd control = bezier_through(places, samples);
-    Eigen::Index column = 0;
-    for (GridArray& array : arrays) {
-      const auto width = static_cast<Eigen::Index>(array.components);
-      append_in_vtk_order(control.middleCols(column, width), array.values);
-      column += width;
-    }
+    const auto sample = [&](const Xi& xi) {
+      return sampled_fields(point_fields(system, frame.state, {e, xi}));
+    };
+    append_in_vtk_order(bezier_through(places, sample), arrays);
   }
   arrays.insert(arrays.begin(), std::move(displacement));
   return {frame.time_s, std::move(arrays), {{"pressure_kPa", 1, {frame.state.pressure_kPa}}}};

@@ -13,7 +13,6 @@ using signal::median;
 
 constexpr size_t most_pairs_for_slopes = 200;
 constexpr double rejection_in_deviations = 4.5;
-constexpr double deviation_of_normal = 1.4826;  // standard deviation / median absolute deviation
 constexpr double least_span_s = 1.0;
 constexpr double largest_drift = 1e-2;  // crystals differ by 1e-4 at most; more is not a drift
 constexpr double least_uncertainty_s = 1e-6;
@@ -45,7 +44,7 @@ std::vector<ClockPair> centre_and_select(const std::vector<ClockPair>& pairs, Cl
   for (double& size : sizes)
     size = std::abs(size);
   const double bound_s =
-      std::max(least_uncertainty_s, rejection_in_deviations * deviation_of_normal * median(sizes));
+      std::max(least_uncertainty_s, rejection_in_deviations * signal::deviation_of_normal(sizes));
   std::vector<ClockPair> kept;
   for (size_t i = 0; i < pairs.size(); ++i) {
     if (sizes[i] <= bound_s) kept.push_back(pairs[i]);

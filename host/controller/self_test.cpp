@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <utility>
+
+#include "protocol/signal/median.hpp"
 
 namespace diastole {
 namespace {
@@ -169,9 +172,8 @@ class Judge {
     std::vector<double> trips_s;
     for (const ClockPair& pair : pairs)
       trips_s.push_back(pair.uncertainty_s);
-    std::ranges::sort(trips_s);
     // Each end of the line is known to half of a usual round trip.
-    const double known_ppm = span_s < 1 ? 0 : 2e6 * trips_s[trips_s.size() / 2] / span_s;
+    const double known_ppm = span_s < 1 ? 0 : 2e6 * signal::median(std::move(trips_s)) / span_s;
     const double most_ppm = crystal_ppm + slewed_ppm + known_ppm;
     add({"clock", "clock against the host's", span_s < 1 ? std::nullopt : std::optional(map->drift_ppm()),
          -most_ppm, most_ppm, "ppm",

@@ -1,6 +1,5 @@
 #include "host/web/console.hpp"
 
-#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
@@ -8,6 +7,7 @@
 
 #include "host/rpc/acceptor.hpp"
 #include "host/web/certificate.hpp"
+#include "host/web/listen.hpp"
 #include "host/web/server_state.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -38,19 +38,7 @@ class ConsoleServer::Listener {
         acceptor_(std::make_shared<Acceptor<tcp>>(
             state_->rpc_state, "a browser",
             [state = state_](tcp::socket socket) { receive_visitor(state, std::move(socket)); })) {
-    tcp::acceptor& acceptor = acceptor_->acceptor;
-    const tcp::endpoint endpoint(address.address, address.port);
-    try {
-      acceptor.open(endpoint.protocol());
-      acceptor.set_option(asio::socket_base::reuse_address(true));
-      acceptor.bind(endpoint);
-      acceptor.listen();
-    } catch (const boost::system::system_error& error) {
-      throw HardwareError("web console",
-                          fmt::format("cannot listen at {}:{}: {}", address.address.to_string(), address.port,
-                                      error.code().message()),
-                          "Choose another port (--console PORT), or see who has this one (ss -ltnp).");
-    }
+    listen_at(acceptor_->acceptor, {address.address, address.port}, "web console", "--console PORT");
     nlohmann::json& console = state_->rpc_state->console;
     if (state_->door.reaches_beyond_this_machine()) encrypt(certificate);
     console["control"] = url(ConsoleRole::control);

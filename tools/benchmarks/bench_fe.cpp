@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "protocol/contract/exit_code.hpp"
+#include "protocol/signal/median.hpp"
 #include "tools/benchmarks/annulus_growth.hpp"
 #include "tools/benchmarks/annulus_solver.hpp"
 
@@ -70,11 +71,6 @@ std::optional<AnnulusElements> first_to_meet(const std::vector<AnnulusAnswer>& a
   return met->elements;
 }
 
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
-}
-
 struct Racer {
   const AnnulusSolver* solver;
   AnnulusElements elements;
@@ -86,7 +82,7 @@ struct Racer {
     std::vector<double> values;
     for (const AnnulusAnswer& run : runs)
       values.push_back(figure(run));
-    return median(values);
+    return signal::median(std::move(values));
   }
 };
 

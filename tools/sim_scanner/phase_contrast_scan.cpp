@@ -7,6 +7,7 @@
 #include <random>
 
 #include "estimator/parallel/parallel_for.hpp"
+#include "protocol/contract/angle.hpp"
 #include "tools/sim_scanner/fourier.hpp"
 
 namespace diastole::scanner {
@@ -25,7 +26,7 @@ struct Moment {
   /// Brightness and phase of a place, mm from the image's middle; `share` of the velocity encoding is in this image.
   [[nodiscard]] std::complex<double> signal(double x_mm, double y_mm, double share) const {
     const double shade = 1 + protocol.shading * (x_mm + y_mm) / (protocol.matrix * protocol.pixel_mm);
-    const double tilt = std::cos(protocol.tilt_deg * pi / 180);
+    const double tilt = std::cos(protocol.tilt_deg * rad_per_deg);
     // Distance from the tube's axis: the slice cuts it slantwise.
     const double radius_mm =
         std::hypot((x_mm - protocol.place_mm.x() - shift_mm) * tilt, y_mm - protocol.place_mm.y());

@@ -3,7 +3,8 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <numbers>
+
+#include "protocol/contract/angle.hpp"
 
 namespace diastole::scanner {
 
@@ -18,7 +19,7 @@ std::vector<ScanPlane> planes_of(const ScanProtocol& protocol) {
   for (const double z_mm : protocol.short_axis_mm)
     planes.push_back(plane({0, 0, z_mm}, Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(), "SA"));
   for (const double angle_deg : protocol.long_axis_deg) {
-    const double angle = angle_deg * std::numbers::pi / 180;
+    const double angle = angle_deg * rad_per_deg;
     planes.push_back(plane({0, 0, protocol.middle_mm}, {std::cos(angle), std::sin(angle), 0},
                            -Eigen::Vector3d::UnitZ(), fmt::format("LA{:03.0f}", angle_deg)));
   }

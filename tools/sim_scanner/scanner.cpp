@@ -5,10 +5,10 @@
 #include <atomic>
 #include <cmath>
 #include <mutex>
-#include <numbers>
 #include <random>
 
 #include "estimator/parallel/parallel_for.hpp"
+#include "protocol/contract/angle.hpp"
 #include "tools/sim_scanner/dicom_image.hpp"
 
 namespace diastole::scanner {
@@ -51,7 +51,7 @@ std::vector<Series> series_of(const ScanProtocol& protocol) {
         series.planes.push_back(i);
         std::vector<TagPlane> tags;
         for (const double angle_deg : angles_deg) {
-          const double angle = angle_deg * std::numbers::pi / 180;
+          const double angle = angle_deg * rad_per_deg;
           tags.push_back({std::cos(angle) * planes[i].along_row + std::sin(angle) * planes[i].along_column,
                           anywhere(engine)});
         }

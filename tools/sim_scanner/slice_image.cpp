@@ -6,6 +6,7 @@
 #include <numbers>
 #include <random>
 
+#include "protocol/contract/angle.hpp"
 #include "tools/sim_scanner/fourier.hpp"
 #include "tools/sim_scanner/pulse_train.hpp"
 
@@ -26,7 +27,7 @@ class Signal {
   Signal(const ScanProtocol& protocol, const std::vector<TagPlane>& tags, double time_s)
       : protocol_(protocol), tags_(tags), time_s_(time_s) {
     for (size_t i = 0; i < table_.size(); ++i)
-      table_[i] = tagged_magnetisation(protocol.tags.weights, protocol.tags.flip_deg * std::numbers::pi / 180,
+      table_[i] = tagged_magnetisation(protocol.tags.weights, protocol.tags.flip_deg * rad_per_deg,
                                        2 * std::numbers::pi * static_cast<double>(i) / table_size);
   }
 

@@ -10,7 +10,7 @@
 #include "estimator/explain/imaging/imaged_specimen.hpp"
 #include "estimator/explain/imaging/linear_evidence.hpp"
 #include "estimator/explain/imaging/specimen_problem.hpp"
-#include "estimator/explain/verdict/chi_square.hpp"
+#include "estimator/inference/tail_probability.hpp"
 #include "estimator/io/study_refusal.hpp"
 
 namespace diastole::explain {
@@ -180,7 +180,8 @@ class AnySpecimen final : public ImagedSpecimen {
   }
   /// Of a gain, less what the mesh may make of it.
   [[nodiscard]] double beyond_mesh(double gain, double degrees, double alternatives) const {
-    return std::min(1.0, alternatives * chi_square_tail(std::max(0.0, gain - mesh_error()), degrees));
+    return std::min(1.0,
+                    alternatives * inference::chi_square_tail(std::max(0.0, gain - mesh_error()), degrees));
   }
 
   [[nodiscard]] double places() const { return distinct_places(volume_mm3_); }

@@ -15,8 +15,8 @@
 #include "estimator/explain/imaging/inclusion_fit.hpp"
 #include "estimator/explain/imaging/linear_evidence.hpp"
 #include "estimator/explain/imaging/prior_strain.hpp"
-#include "estimator/explain/verdict/chi_square.hpp"
 #include "estimator/inference/intervals.hpp"
+#include "estimator/inference/tail_probability.hpp"
 #include "estimator/model/affected_model.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -115,9 +115,9 @@ class Explainer {
     for (const Family& family : families_) {
       const LinearEvidence::Gain gain = evidence.gain(family.columns);
       const auto degrees = static_cast<double>(gain.degrees);
-      const double p =
-          std::min(1.0, static_cast<double>(families_.size()) *
-                            chi_square_tail(gain.chi_square - allowed - specimen_.mesh_error(), degrees));
+      const double p = std::min(
+          1.0, static_cast<double>(families_.size()) *
+                   inference::chi_square_tail(gain.chi_square - allowed - specimen_.mesh_error(), degrees));
       if (p < most.p_value) most = {family.name, gain.chi_square - degrees, p};
     }
     return most;
@@ -126,7 +126,7 @@ class Explainer {
   /// How seldom pressures, C1 and the radius are as far off as that by their errors and the mesh's.
   [[nodiscard]] double strain(const FieldFit& fit) const {
     const PriorStrain strain = prior_strain(fit);
-    return chi_square_tail(strain.chi_square - specimen_.mesh_error(), strain.degrees);
+    return inference::chi_square_tail(strain.chi_square - specimen_.mesh_error(), strain.degrees);
   }
   /// A frame whose pressure the motion contradicts.
   struct PressureStrain {

@@ -9,7 +9,7 @@
 
 #include "estimator/explain/imaging/inclusion_fit.hpp"
 #include "estimator/explain/imaging/linear_evidence.hpp"
-#include "estimator/explain/verdict/chi_square.hpp"
+#include "estimator/inference/tail_probability.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -98,8 +98,8 @@ FieldHypothesis judged(FieldFit fit, const FieldFit& base, const FieldHypothesis
   pair.score = pair.gain - 2.0 * parameters - 2.0 * std::log(pairs_tried() * places);
   const double alone = std::max(a.gain, b.gain);
   const double added = parameters - 1.0;
-  pair.p_value =
-      std::min(1.0, pairs_tried() * places * chi_square_tail(std::max(0.0, pair.gain - alone), added));
+  pair.p_value = std::min(
+      1.0, pairs_tried() * places * inference::chi_square_tail(std::max(0.0, pair.gain - alone), added));
   return pair;
 }
 
@@ -164,8 +164,8 @@ std::vector<FieldHypothesis> fit_round_effects(FieldProblem& problem, const Fiel
     tried.gain = base.chi_square - tried.fit.chi_square;
     const auto parameters = static_cast<double>(tried.fit.choice.free.size());
     tried.score = tried.gain - 2.0 * parameters;
-    tried.p_value =
-        std::min(1.0, static_cast<double>(field_effects().size()) * chi_square_tail(tried.gain, parameters));
+    tried.p_value = std::min(1.0, static_cast<double>(field_effects().size()) *
+                                      inference::chi_square_tail(tried.gain, parameters));
     result.push_back(std::move(tried));
   }
   return result;

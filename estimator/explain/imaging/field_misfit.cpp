@@ -10,7 +10,7 @@
 #include <numbers>
 
 #include "estimator/explain/imaging/linear_evidence.hpp"
-#include "estimator/explain/verdict/chi_square.hpp"
+#include "estimator/inference/tail_probability.hpp"
 #include "estimator/mesh/wall_coordinates.hpp"
 
 namespace diastole::explain {
@@ -156,8 +156,9 @@ std::vector<Misfit> misfit_regions(const HermiteMesh& mesh, const MotionResidual
       if (tags[begun + cell] < 30) continue;
       const LinearEvidence::Gain gain = evidence.gain({first, first + 1, first + 2});
       if (gain.degrees == 0) continue;
-      const double p = std::min(1.0, static_cast<double>(cells) *
-                                         chi_square_tail(gain.chi_square, static_cast<double>(gain.degrees)));
+      const double p =
+          std::min(1.0, static_cast<double>(cells) *
+                            inference::chi_square_tail(gain.chi_square, static_cast<double>(gain.degrees)));
       if (p > significant_there) continue;
       Misfit misfit;
       misfit.port = "field";

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "estimator/explain/verdict/experiment_plan.hpp"
+#include "estimator/inference/information.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -66,18 +67,19 @@ class Gram {
     sum_.topLeftCorner(sums.rows(), sums.cols()) += weight * weight * sums;
   }
   [[nodiscard]] const Eigen::MatrixXd& sums() const { return sum_; }
-  [[nodiscard]] double separation() const {
-    const Index n = sum_.cols() - 1;
-    const Eigen::VectorXd g = sum_.col(0).tail(n);
-    const double left = sum_(0, 0) - g.dot(information().ldlt().solve(g));
-    return std::sqrt(std::max(0.0, left));
-  }
+  [[nodiscard]] double separation() const { return inference::separation(sum_, hardly_known()); }
   [[nodiscard]] Eigen::MatrixXd information() const {
     const Index n = sum_.cols() - 1;
-    return sum_.bottomRightCorner(n, n) + 1e-12 * Eigen::MatrixXd::Identity(n, n);
+    return sum_.bottomRightCorner(n, n) + hardly_known();
   }
 
  private:
+  /// So that unknowns of which the rows say nothing are harmless.
+  [[nodiscard]] Eigen::MatrixXd hardly_known() const {
+    const Index n = sum_.cols() - 1;
+    return 1e-12 * Eigen::MatrixXd::Identity(n, n);
+  }
+
   Eigen::MatrixXd sum_;
 };
 

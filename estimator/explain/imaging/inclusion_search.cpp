@@ -6,7 +6,8 @@
 #include <numbers>
 
 #include "estimator/explain/imaging/linear_evidence.hpp"
-#include "estimator/explain/verdict/chi_square.hpp"
+#include "estimator/inference/tail_probability.hpp"
+#include "protocol/contract/angle.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -51,7 +52,7 @@ std::vector<Inclusion> places_in(const HermiteMesh& mesh) {
       places.push_back({.contrast = 2.0,
                         .radius_mm = std::hypot(X_mm[0], X_mm[1]),
                         .z_mm = X_mm[2],
-                        .theta_deg = std::atan2(X_mm[1], X_mm[0]) * 180.0 / std::numbers::pi,
+                        .theta_deg = std::atan2(X_mm[1], X_mm[0]) / rad_per_deg,
                         .semi_axes_mm = {guessed_axis_mm, guessed_axis_mm, guessed_axis_mm},
                         .edge_width_mm = 4.0});
     }
@@ -117,7 +118,7 @@ std::vector<InclusionGuess> search_inclusion(const InclusionLattice& lattice, do
     guess.inclusion.edge_width_mm = 2.0;
     // An inclusion saturates: its own strain vanishes as it stiffens.
     guess.inclusion.contrast = amount > 0.0 ? std::min(4.0, 1.0 + 1.5 * amount) : std::max(0.3, 1.0 + amount);
-    guess.p_value = std::min(1.0, distinct_places(volume_mm3) * chi_square_tail(gain, 1.0));
+    guess.p_value = std::min(1.0, distinct_places(volume_mm3) * inference::chi_square_tail(gain, 1.0));
   }
   if (best[1].gain > best[0].gain) std::swap(best[0], best[1]);
   return best;

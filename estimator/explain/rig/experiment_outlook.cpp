@@ -284,11 +284,4 @@ Eigen::MatrixXd gram_beside(const rig::SessionProblem& problem, const FittedMode
   return sum;
 }
 
-double separation(const Eigen::MatrixXd& gram, const Eigen::MatrixXd& known) {
-  const Eigen::Index count = gram.rows() - 1;
-  const Eigen::VectorXd g = gram.block(1, 0, count, 1);
-  const Eigen::MatrixXd normal = gram.block(1, 1, count, count) + known;
-  return std::sqrt(std::max(0.0, gram(0, 0) - g.dot(normal.ldlt().solve(g))));
-}
-
 }  // namespace diastole::explain

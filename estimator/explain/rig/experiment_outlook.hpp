@@ -6,9 +6,7 @@
 // theta with the columns K = W dy_B/dtheta, the sensors' zeros of a new run by two more with a prior of 30 Pa, and the
 // cycles' sizes are taken off along W y_A, and what the model's own error may be in the segment (harmonics of the cycle, sizes
 // as in estimator/rig_fit/model_error.hpp) is taken off too. Rows of several segments add, so that only Gram matrices [r K]' [r K] are kept,
-// one a channel. The separation is what is left:
-//
-//   d^2 = r'r - g' (K'K + P)^-1 g,  g = K'r,  P: what the session's own data say of B's unknowns.
+// one a channel. What is left is their inference::separation d, with what the session's own data say of B's unknowns known beforehand.
 //
 // A real refit also bends: from some ten sigma on d is too large, by up to a half. The choice suffers little.
 
@@ -68,8 +66,5 @@ struct SpecimenKnowledge {
 Eigen::MatrixXd gram_beside(const rig::SessionProblem& problem, const FittedModel& truth,
                             const FittedModel& adapting, const Equipment& equipment,
                             const SpecimenKnowledge& knowledge);
-
-/// d of the header, from a sum of Gram matrices.
-double separation(const Eigen::MatrixXd& gram, const Eigen::MatrixXd& known);
 
 }  // namespace diastole::explain

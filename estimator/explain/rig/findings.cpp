@@ -11,8 +11,8 @@
 #include <set>
 
 #include "estimator/explain/rig/value_errors.hpp"
-#include "estimator/explain/verdict/chi_square.hpp"
 #include "estimator/inference/intervals.hpp"
+#include "estimator/inference/tail_probability.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -142,11 +142,11 @@ std::vector<Misfit> misfits(const rig::SessionProblem& problem, const EffectSet&
     misfit.phase = phase_of(block, left);
     misfit.band_Hz = band_of(block, left);
     misfit.excess_chi2 = square - dofs;
-    misfit.p_value = chi_square_tail(square, dofs);
+    misfit.p_value = inference::chi_square_tail(square, dofs);
     p_values.push_back(misfit.p_value);
     list.push_back(std::move(misfit));
   }
-  const double limit = discovery_limit(p_values, discovery_rate);
+  const double limit = inference::discovery_limit(p_values, discovery_rate);
   std::erase_if(list, [&](const Misfit& misfit) { return misfit.p_value > limit; });
   std::ranges::sort(list, std::greater(), &Misfit::excess_chi2);
   list.resize(std::min(list.size(), most));

@@ -170,7 +170,7 @@ std::optional<NextExperiment> separating_experiment(const ExperimentDesign& desi
           const Eigen::MatrixXd gram =
               gram_of(outlooks, chosen, a, b, equipment) +
               gram_beside(design.problem, *models[a], *models[b], equipment, design.knowledge);
-          least = std::min(least, separation(gram, known[b]));
+          least = std::min(least, inference::separation(gram, known[b]));
         }
     }
     return least;

@@ -1,11 +1,10 @@
 #include "estimator/explain/rig/part_strain.hpp"
 
-#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 
-namespace diastole::explain {
+#include "estimator/inference/tail_probability.hpp"
 
-double seldom(double sds) { return boost::math::cdf(boost::math::complement(boost::math::normal(), sds)); }
+namespace diastole::explain {
 
 double largest_tolerance(const rig::SessionProblem& problem, const rig::SessionModel& model,
                          const Eigen::VectorXd& u) {
@@ -26,7 +25,8 @@ double fineness(const rig::SessionProblem& problem, const rig::SessionModel& mod
 double strain_by_chance(const rig::SessionProblem& problem, const rig::SessionModel& model,
                         const Eigen::VectorXd& u) {
   const auto tolerances = static_cast<double>(problem.nuisances().size() - rig::basic_nuisances);
-  return -std::expm1(tolerances * std::log1p(-2.0 * seldom(largest_tolerance(problem, model, u))));
+  return -std::expm1(tolerances *
+                     std::log1p(-2.0 * inference::normal_tail(largest_tolerance(problem, model, u))));
 }
 
 bool is_strained(const rig::SessionProblem& problem, const EffectSet& set) {

@@ -8,9 +8,6 @@ namespace diastole::explain {
 /// How seldom any part of a model's error, or any part of the rig, may be as far off by chance: two sds of one.
 inline constexpr double surprising_by_chance = 0.0228, surprising_sds = 2.0;
 
-/// How often a normal error lies further to one side.
-double seldom(double sds);
-
 /// Of the tolerances `u` (or what ends with them) of a model the one furthest from its prior, in sds of the list or of
 /// what references left: to be a little coarser than in a fine rig is no strain.
 double largest_tolerance(const rig::SessionProblem& problem, const rig::SessionModel& model,

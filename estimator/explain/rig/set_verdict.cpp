@@ -1,7 +1,6 @@
 #include "estimator/explain/rig/set_verdict.hpp"
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -9,6 +8,7 @@
 #include "estimator/explain/rig/changed_parts.hpp"
 #include "estimator/explain/rig/held_out.hpp"
 #include "estimator/explain/rig/part_strain.hpp"
+#include "estimator/inference/tail_probability.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -155,7 +155,7 @@ double irregularity_by_chance(const rig::SessionProblem& problem,
     const auto group = channel.signal == rig::Signal::pump ? rig::ErrorGroup::pump : rig::ErrorGroup::cavity;
     const double least_kPa = rig::SharePrior::least[static_cast<size_t>(group)] *
                              problem.error().range[static_cast<size_t>(channel.signal)];
-    if (channel.rms_kPa > least_kPa) least = std::min(least, seldom(channel.sds));
+    if (channel.rms_kPa > least_kPa) least = std::min(least, inference::normal_tail(channel.sds));
   }
   return least;
 }
@@ -175,8 +175,7 @@ double strain_in_all_by_chance(const rig::SessionProblem& problem, const EffectS
   const Eigen::MatrixXd covariance = (root * root.transpose())(known, known);
   const VectorXd of_known = moved(known);
   const double square = of_known.dot(covariance.llt().solve(of_known));
-  return boost::math::cdf(
-      boost::math::complement(boost::math::chi_squared(static_cast<double>(known.size())), square));
+  return inference::chi_square_tail(square, static_cast<double>(known.size()));
 }
 
 /// How often, by chance, the parts of the error are as large beneath this name, or the rig's as far off in all: what its effects
@@ -186,7 +185,7 @@ double name_by_chance(const rig::SessionProblem& problem, const EffectSet& set, 
   error.noise += right_to * right_to * sizes.changed;
   const rig::EvidenceFit again = fit_with_shares(set.target(), set.columns, error, set.evidence.shares);
   const auto parts = static_cast<double>(parts_of(error));
-  return std::min(parts * seldom(std::ranges::max(again.surprise(error.prior))),
+  return std::min(parts * inference::normal_tail(std::ranges::max(again.surprise(error.prior))),
                   strain_in_all_by_chance(problem, set, again.u.tail(set.model.u.size())));
 }
 
@@ -200,7 +199,8 @@ double held_out_odds(double held_out_gain, size_t effects) {
 /// are as seldom together (Fisher 1925: minus two ln of their product is chi-square on four). 0 of a search that did not settle.
 double nothing_wrong_by_chance(const rig::SessionProblem& problem, const EffectSet& set) {
   if (!inference::is_settled(set.termination)) return 0.0;
-  const double misfit = seldom(std::ranges::max(set.evidence.surprise(problem.error().prior)));
+  const double misfit =
+      inference::normal_tail(std::ranges::max(set.evidence.surprise(problem.error().prior)));
   const double strain = strain_by_chance(problem, set.model, set.model.u);
   const double product = misfit * strain;
   const double together = product > 0.0 ? product * (1.0 - std::log(product)) : 0.0;

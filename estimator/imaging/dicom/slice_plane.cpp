@@ -4,7 +4,8 @@
 
 #include <array>
 #include <cmath>
-#include <numbers>
+
+#include "protocol/contract/angle.hpp"
 
 namespace diastole::imaging {
 namespace {
@@ -34,7 +35,7 @@ std::string orientation_in_words(const SlicePlane& plane) {
   static constexpr std::array names = {"sagittal", "coronal", "transverse"};
   Eigen::Index axis = 0;
   const double along = plane.normal().cwiseAbs().maxCoeff(&axis);
-  const double tilt_deg = std::acos(std::min(1.0, along)) * 180.0 / std::numbers::pi;
+  const double tilt_deg = std::acos(std::min(1.0, along)) / rad_per_deg;
   const char* name = names[static_cast<size_t>(axis)];
   return tilt_deg < 0.5 ? name : fmt::format("{}, tilted {:.0f} degrees", name, tilt_deg);
 }

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "estimator/imaging/diffusion/gradient_turn.hpp"
 #include "estimator/imaging/diffusion/wall_agreement.hpp"
+#include "protocol/contract/angle.hpp"
 
 namespace diastole::imaging {
 namespace {
@@ -121,7 +121,7 @@ void judge(AxisCandidate& candidate, const std::vector<WallVoxel>& voxels, doubl
   const HelixCourse course = course_of(voxels, candidate.change);
   const auto angles = course.angles_rad();
   candidate.agreement = agreeing_part(course) / all;
-  candidate.helix_slope_deg = (angles.back() - angles.front()) * 180 / std::numbers::pi;
+  candidate.helix_slope_deg = (angles.back() - angles.front()) / rad_per_deg;
 }
 
 /// Of those that agree as well as the best, the first with a heart's helix; along the patient's axes before the image's.

@@ -18,6 +18,7 @@
 #include "estimator/mesh/nodal_lines.hpp"
 #include "estimator/parallel/parallel_for.hpp"
 #include "estimator/sparse/sparse_cholesky.hpp"
+#include "protocol/contract/angle.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole::imaging {
@@ -27,21 +28,20 @@ using Vector5 = Eigen::Matrix<double, 5, 1>;
 using Matrix5 = Eigen::Matrix<double, 5, 5>;
 using Sparse = Eigen::SparseMatrix<double>;
 
-constexpr double degree = std::numbers::pi / 180;
 constexpr size_t fields = 5;  // alpha, gamma, A, B1, B2
 enum Field : size_t { helix, transverse, anisotropy, sheet_even, sheet_odd };
 
 constexpr size_t least_voxels = 50;
 constexpr double student_freedom = 5;
 /// A bend between neighbours, before the data say how much: radians, 1e-3 mm²/s. Only the first iteration depends on it.
-constexpr std::array<double, fields> first_bend{5 * degree, 3 * degree, 0.03, 0.03, 0.03};
+constexpr std::array<double, fields> first_bend{5 * rad_per_deg, 3 * rad_per_deg, 0.03, 0.03, 0.03};
 /// In a heart no fibre leaves the wall by more than this, and no tensor is this anisotropic: what holds nodes that no voxel knows.
-constexpr std::array<double, fields> widest{180 * degree, 30 * degree, 1.0, 1.0, 1.0};
+constexpr std::array<double, fields> widest{180 * rad_per_deg, 30 * rad_per_deg, 1.0, 1.0, 1.0};
 /// Anisotropy known no better than this share even where a voxel is all wall: tensors of mixed depths are no mean of tensors.
 constexpr double size_slack = 0.05;
 constexpr int most_iterations = 40;
-constexpr double settled_rad = 0.1 * degree;  // root mean square
-constexpr double longest_step_rad = 20 * degree;
+constexpr double settled_rad = 0.1 * rad_per_deg;  // root mean square
+constexpr double longest_step_rad = 20 * rad_per_deg;
 constexpr std::array<double, 3> bend_weights{1, -2, 1};
 constexpr int probes = 16;
 constexpr int draw_count = 128;  // standard deviations to 6 %
@@ -193,7 +193,7 @@ class Estimation {
       const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> model(deviator_of(datum.model));
       const double cosine =
           std::abs(model.eigenvectors().col(2).dot(shape_of(datum.voxel->voxel->tensor).vectors.col(0)));
-      squares += std::pow(std::acos(std::min(1.0, cosine)) / degree, 2);
+      squares += std::pow(std::acos(std::min(1.0, cosine)) / rad_per_deg, 2);
     }
     estimate.rms_deg = std::sqrt(squares / static_cast<double>(data_.size()));
     return estimate;
@@ -237,7 +237,7 @@ class Estimation {
   static std::vector<FibreAngles> angles(const Eigen::VectorXd& u) {
     std::vector<FibreAngles> all;
     for (size_t n = 0; n < static_cast<size_t>(u.size()) / fields; ++n)
-      all.push_back({at(u, n, helix) / degree, at(u, n, transverse) / degree});
+      all.push_back({at(u, n, helix) / rad_per_deg, at(u, n, transverse) / rad_per_deg});
     return all;
   }
 
@@ -509,7 +509,7 @@ FibreAt FibreEstimate::at(const MaterialPoint& point) const {
     return sum;
   };
   const auto direction = [&](const FibreAngles& a) -> Eigen::Vector3d {
-    return wall * triad(degree * a.helix_deg, degree * a.transverse_deg).col(0);
+    return wall * triad(rad_per_deg * a.helix_deg, rad_per_deg * a.transverse_deg).col(0);
   };
   FibreAt found;
   found.angles = interpolated(nodes);
@@ -518,7 +518,7 @@ FibreAt FibreEstimate::at(const MaterialPoint& point) const {
   for (const auto& draw : draws) {
     const FibreAngles drawn = interpolated(draw);
     const double cosine = std::min(1.0, std::abs(direction(drawn).dot(found.direction)));
-    squares += std::pow(std::acos(cosine) / degree, 2);
+    squares += std::pow(std::acos(cosine) / rad_per_deg, 2);
     helix_squares += std::pow(drawn.helix_deg - found.angles.helix_deg, 2);
   }
   const double count = std::max<double>(1, static_cast<double>(draws.size()));

@@ -15,19 +15,13 @@ BezierGrid fibre_grid(const FibreEstimate& field) {
       {"fibre_direction", 3, {}}, {"helix_deg", 1, {}}, {"transverse_deg", 1, {}}, {"sigma_deg", 1, {}}};
   for (size_t e = 0; e < mesh.element_count(); ++e) {
     append_in_vtk_order(bezier_of(mesh.gather(e, mesh.reference())).transpose(), grid.points_mm);
-    Eigen::MatrixXd samples(64, 6);
-    for (size_t q = 0; q < 64; ++q) {
-      const FibreAt at = field.at({e, {places[q % 4], places[q / 4 % 4], places[q / 16]}});
-      samples.row(static_cast<Eigen::Index>(q)) << at.direction.transpose(), at.angles.helix_deg,
-          at.angles.transverse_deg, at.sigma_deg;
-    }
-    const Eigen::MatrixXd control = bezier_through(places, samples);
-    Eigen::Index column = 0;
-    for (GridArray& array : arrays) {
-      const auto width = static_cast<Eigen::Index>(array.components);
-      append_in_vtk_order(control.middleCols(column, width), array.values);
-      column += width;
-    }
+    const auto sample = [&](const Xi& xi) {
+      const FibreAt at = field.at({e, xi});
+      Eigen::VectorXd numbers(6);
+      numbers << at.direction, at.angles.helix_deg, at.angles.transverse_deg, at.sigma_deg;
+      return numbers;
+    };
+    append_in_vtk_order(bezier_through(places, sample), arrays);
   }
   grid.steps.push_back({0.0, std::move(arrays), {}});
   return grid;

@@ -8,11 +8,11 @@
 #include <numbers>
 
 #include "estimator/imaging/diffusion/wall_agreement.hpp"
+#include "protocol/contract/angle.hpp"
 
 namespace diastole::imaging {
 namespace {
 
-constexpr double radians_per_degree = std::numbers::pi / 180;
 /// Right tables of nine labelled ventricles seem turned by 0.3 to 4.7 degrees; the most where helix angles vary by 12 degrees around the
 /// wall and fibres leave it by 6.
 constexpr double least_turn_deg = 8;
@@ -81,7 +81,7 @@ class SectoredWall {
                                           double first_step_deg) const {
     Eigen::Matrix3d rotation = rotation_by(start);
     double best = agreeing(rotation, without_part);
-    for (double step = first_step_deg * radians_per_degree; step > 0.2 * radians_per_degree; step /= 2) {
+    for (double step = first_step_deg * rad_per_deg; step > 0.2 * rad_per_deg; step /= 2) {
       for (bool gains = true; gains;) {
         gains = false;
         for (int k = 0; k < 6; ++k) {
@@ -125,8 +125,8 @@ GradientTurn find_gradient_turn(const std::vector<WallVoxel>& voxels, const Eige
   const Eigen::Vector3d turn = wall.best_turn(axial_parts, Eigen::Vector3d::Zero(), 18);
   GradientTurn found;
   found.rotation = rotation_by(turn);
-  found.angle_deg = turn.norm() / radians_per_degree;
-  found.across_deg = (turn - turn.dot(wall.long_axis()) * wall.long_axis()).norm() / radians_per_degree;
+  found.angle_deg = turn.norm() / rad_per_deg;
+  found.across_deg = (turn - turn.dot(wall.long_axis()) * wall.long_axis()).norm() / rad_per_deg;
   if (found.angle_deg < least_turn_deg) return found;
   // The jackknife's variance: (n - 1)/n of the squares about the mean.
   std::array<Eigen::Vector3d, axial_parts> without;
@@ -138,7 +138,7 @@ GradientTurn find_gradient_turn(const std::vector<WallVoxel>& voxels, const Eige
   double squares = 0;
   for (const Eigen::Vector3d& one : without)
     squares += (one - mean).squaredNorm();
-  found.sigma_deg = std::sqrt((axial_parts - 1.0) / axial_parts * squares) / radians_per_degree;
+  found.sigma_deg = std::sqrt((axial_parts - 1.0) / axial_parts * squares) / rad_per_deg;
   return found;
 }
 

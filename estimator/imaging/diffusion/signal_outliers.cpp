@@ -104,8 +104,8 @@ std::vector<std::optional<LogGain>> gains_of(const DiffusionSeries& series, cons
     const double count = static_cast<double>(logs.size());
     for (double& value : logs)
       value = std::abs(value - middle);
-    // Of a normal sample: 1.4826 MAD is its sigma, 1.25 sigma / sqrt(n) the median's error.
-    gains[i] = {middle, 1.25 * 1.4826 * signal::median(std::move(logs)) / std::sqrt(count)};
+    // The error of a normal sample's median: 1.25 sigma / sqrt(n).
+    gains[i] = {middle, 1.25 * signal::deviation_of_normal(std::move(logs)) / std::sqrt(count)};
   }
   return gains;
 }

@@ -238,7 +238,7 @@ void join_cycle(FlowMeasurement& flow, const FlowRequest& request) {
   const PhaseContrast& scan = flow.scan;
   const Eigen::VectorXd time =
       Eigen::Map<const Eigen::VectorXd>(scan.time_s.data(), static_cast<Eigen::Index>(scan.phases()));
-  flow.flow = periodic_curve(time, flow.lumen.flow_mL_s, flow.lumen.covariance, scan.interval_s);
+  flow.flow = periodic_regression(time, flow.lumen.flow_mL_s, flow.lumen.covariance, scan.interval_s);
   const Eigen::VectorXd whole = flow.flow.integral_row(scan.interval_s);
   flow.closure_mL = {flow.flow.of(whole), flow.flow.sigma_of(whole)};
   flow.is_closed = request.close;

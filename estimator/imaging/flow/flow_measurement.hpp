@@ -6,7 +6,7 @@
 
 #include "estimator/imaging/flow/background_phase.hpp"
 #include "estimator/imaging/flow/lumen_fit.hpp"
-#include "estimator/imaging/flow/periodic_curve.hpp"
+#include "estimator/imaging/flow/periodic_regression.hpp"
 #include "estimator/imaging/flow/phase_contrast.hpp"
 #include "estimator/io/finding.hpp"
 
@@ -35,8 +35,8 @@ struct FlowMeasurement {
   LumenFit lumen;
   BackgroundPhase background;
   std::vector<PhaseFlow> phases;
-  PeriodicCurve flow;  ///< mL/s over the interval
-  double least_s = 0;  ///< when the volume is least
+  PeriodicRegression flow;  ///< mL/s over the interval
+  double least_s = 0;       ///< when the volume is least
   ValueWithError stroke_mL;
   ValueWithError closure_mL;  ///< what a cycle does not return, before any correction
   bool is_closed = false;

@@ -38,7 +38,7 @@ int64_t cycles_in(double interval_s, double period_s, const runfile::RecordedRun
 }
 
 /// Work = sum of p (Q - mean Q) over even times, exact for harmonics; its error from both curves'.
-ValueWithError work_of(const PeriodicCurve& flow, const PeriodicCurve& pressure) {
+ValueWithError work_of(const PeriodicRegression& flow, const PeriodicRegression& pressure) {
   const auto times =
       static_cast<Eigen::Index>(2 * std::max(flow.coefficients.size(), pressure.coefficients.size()));
   Eigen::VectorXd by_flow = Eigen::VectorXd::Zero(flow.coefficients.size());
@@ -182,7 +182,8 @@ PressureVolumeLoop pressure_volume_loop(const FlowMeasurement& flow, const runfi
   }
   // A few cycles' own spread may by chance be nothing.
   variance = variance.cwiseMax(0.1 * variance.mean() + 1e-12);
-  const PeriodicCurve pressure = periodic_curve(time, mean, variance.asDiagonal(), flow.interval_s());
+  const PeriodicRegression pressure =
+      periodic_regression(time, mean, variance.asDiagonal(), flow.interval_s());
   double peak = 0;
   for (Eigen::Index i = 0; i < count; ++i)
     peak = std::max(peak, std::abs(flow.flow_at(time[i]).value));

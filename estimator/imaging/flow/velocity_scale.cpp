@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "protocol/contract/input_error.hpp"
+#include "protocol/signal/quantile.hpp"
 
 namespace diastole::imaging {
 namespace {
@@ -40,11 +41,8 @@ std::optional<double> full_scale_in_air(const std::vector<Image>& velocity,
   for (const Image& image : magnitude)
     mean += image / static_cast<float>(magnitude.size());
   // The darkest pixels have noise alone; what rings from an edge is brighter.
-  std::vector<float> sorted(mean.data(), mean.data() + mean.size());
-  const auto dark =
-      sorted.begin() + static_cast<std::ptrdiff_t>(dark_share * static_cast<double>(sorted.size()));
-  std::nth_element(sorted.begin(), dark, sorted.end());
-  const auto threshold = static_cast<float>(noise_spread) * *dark;
+  const float dark = signal::quantile(std::vector<float>(mean.data(), mean.data() + mean.size()), dark_share);
+  const auto threshold = static_cast<float>(noise_spread) * dark;
   size_t count = 0, zeros = 0;
   double sum = 0, most = 0;
   for (const Image& image : velocity) {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
@@ -10,6 +11,7 @@
 
 #include "estimator/imaging/geometry/wall_rays.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/signal/quantile.hpp"
 
 namespace diastole::imaging {
 namespace {
@@ -24,10 +26,8 @@ GreyLevels levels_of(const std::vector<CineSlice>& slices) {
     for (const Eigen::ArrayXXd& image : slice.images)
       values.insert(values.end(), image.data(), image.data() + image.size());
   std::sort(values.begin(), values.end());
-  const auto quantile = [&](double q) {
-    return values[static_cast<size_t>(q * static_cast<double>(values.size() - 1))];
-  };
-  std::array<double, 3> mean{quantile(0.1), 0, quantile(0.99)};
+  std::array<double, 3> mean{signal::quantile_of_sorted(values, 0.1), 0,
+                             signal::quantile_of_sorted(values, 0.99)};
   // Muscle is nearer to dark surroundings than to blood.
   mean[1] = mean[0] + 0.3 * (mean[2] - mean[0]);
   for (int i = 0; i < 30; ++i) {

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "estimator/imaging/geometry/wall_map.hpp"
+#include "protocol/contract/angle.hpp"
 
 namespace diastole::imaging {
 namespace {
@@ -31,7 +32,7 @@ std::vector<Section> sections_of(const VentricleFit& fit, const GuidePoints& gui
   if (!sections.empty()) return sections;
   for (const double degrees : {0.0, 60.0, 120.0})
     sections.push_back(
-        {degrees * pi / 180, slices.size(), fmt::format("At {:.0f} degrees around the axis.", degrees)});
+        {degrees * rad_per_deg, slices.size(), fmt::format("At {:.0f} degrees around the axis.", degrees)});
   return sections;
 }
 

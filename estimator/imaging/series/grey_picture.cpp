@@ -2,22 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "estimator/io/tracking_file.hpp"
+#include "protocol/signal/quantile.hpp"
 
 namespace diastole::imaging {
 
 float white_of(std::span<const Image> images) {
-  constexpr double white_share = 0.995, least = 1e-6;
+  constexpr double white_share = 0.995;
+  constexpr float least = 1e-6F;
   std::vector<float> values;
   for (const Image& image : images)
     values.insert(values.end(), image.data(), image.data() + image.size());
-  if (values.empty()) return static_cast<float>(least);
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(white_share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return std::max(*at, static_cast<float>(least));
+  return std::max(signal::quantile(std::move(values), white_share), least);
 }
 
 std::string grey_picture(const Image& image, float white) {

@@ -14,6 +14,7 @@
 #include "estimator/io/fingerprint.hpp"
 #include "estimator/parallel/parallel_for.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/signal/quantile.hpp"
 
 namespace diastole::imaging {
 namespace {
@@ -47,14 +48,8 @@ void report_fault(const FileFault& fault, const fs::path& file, const std::strin
 /// Both halves of the values on either side of zero, of like extent.
 bool is_signed_about_zero(const Image& image) {
   std::vector<float> values(image.data(), image.data() + image.size());
-  const auto quantile = [&](double share) {
-    const auto at =
-        values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), at, values.end());
-    return static_cast<double>(*at);
-  };
-  const double low = quantile(0.02);
-  const double high = quantile(0.98);
+  const auto low = static_cast<double>(signal::quantile(values, 0.02));
+  const auto high = static_cast<double>(signal::quantile(std::move(values), 0.98));
   return low < 0 && high > 0 && std::abs(low + high) < one_sided * (high - low);
 }
 

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
+#include <utility>
 
 #include "estimator/imaging/series/spectrum.hpp"
+#include "protocol/signal/median.hpp"
 
 namespace diastole::imaging {
 namespace {
@@ -101,11 +103,8 @@ std::vector<Peak> peaks(const Eigen::ArrayXXcf& spectrum, const SlicePlane& plan
     }
   }
   std::vector<double> medians;
-  for (auto& ring : rings) {
-    const auto middle = ring.begin() + static_cast<std::ptrdiff_t>(ring.size() / 2);
-    std::nth_element(ring.begin(), middle, ring.end());
-    medians.push_back(ring.empty() ? 0.0 : static_cast<double>(*middle));
-  }
+  for (auto& ring : rings)
+    medians.push_back(ring.empty() ? 0.0 : static_cast<double>(signal::median(std::move(ring))));
   std::vector<Peak> found;
   for (Peak& peak : candidates) {
     peak.prominence =

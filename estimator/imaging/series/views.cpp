@@ -4,9 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <set>
 #include <tuple>
+
+#include "protocol/contract/angle.hpp"
 
 namespace diastole::imaging {
 namespace {
@@ -76,8 +77,8 @@ std::string view_in_words(const ImageFolder& folder, const ImageSeries& series) 
   if (std::abs(normal.dot(reference->normal())) > 0.5) return fmt::format("short axis ({})", anatomical);
   // The slice contains the direction at a right angle to its own normal and to the axis.
   const Eigen::Vector3d within = reference->normal().cross(normal);
-  double angle_deg = std::atan2(within.dot(reference->along_column), within.dot(reference->along_row)) *
-                     180.0 / std::numbers::pi;
+  double angle_deg =
+      std::atan2(within.dot(reference->along_column), within.dot(reference->along_row)) / rad_per_deg;
   angle_deg -= 180.0 * std::floor(angle_deg / 180.0);
   if (angle_deg > 179.5) angle_deg = 0;
   return fmt::format("long axis, {:.0f} degrees ({})", angle_deg, anatomical);

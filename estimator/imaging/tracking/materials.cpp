@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "estimator/imaging/tracking/brightness.hpp"
 #include "protocol/signal/quantile.hpp"
@@ -14,8 +13,6 @@ namespace {
 
 /// Of the largest piece of tissue (remove_specks).
 constexpr double least_share = 0.1;
-
-constexpr double pi = std::numbers::pi;
 
 /// Water that is stirred loses its tags within a phase or two, tissue keeps them for its T1 of 0.3 to 1.5 s, still water for 2 s and more.
 constexpr std::array typical_T1_s = {0.1, 0.8, 3.0};

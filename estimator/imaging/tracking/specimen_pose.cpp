@@ -30,7 +30,7 @@ double spread(const std::vector<double>& values) {
   std::vector<double> off;
   for (const double value : values)
     off.push_back(std::abs(value - centre));
-  return 1.4826 * median(off);
+  return signal::deviation_of_normal(std::move(off));
 }
 
 /// Depth between pixels; far outside where there is no image.

@@ -7,6 +7,7 @@
 
 #include "estimator/io/whole_file.hpp"
 #include "estimator/parallel/parallel_for.hpp"
+#include "protocol/contract/angle.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole::imaging {
@@ -24,7 +25,8 @@ void settle_pose(const TrackRequest& request, TrackedFolder& tracked) {
     if (!found.pose) return;
     const double apart_mm = (tracked.pose->origin_mm - found.pose->origin_mm).norm();
     const double turned_deg =
-        std::acos(std::min(1.0, std::abs(tracked.pose->axes.col(2).dot(found.pose->axes.col(2))))) * 57.29578;
+        std::acos(std::min(1.0, std::abs(tracked.pose->axes.col(2).dot(found.pose->axes.col(2))))) /
+        rad_per_deg;
     // The outlines are good to a fraction of a pixel, and an operator's marks to about a pixel.
     if (apart_mm > 2 || turned_deg > 2)
       tracked.problems.push_back(

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "estimator/imaging/series/grey_picture.hpp"
 #include "estimator/imaging/tracking/outline.hpp"
+#include "protocol/contract/angle.hpp"
 
 namespace diastole::imaging {
 namespace {
@@ -20,7 +20,7 @@ TrackedSliceImages slice_record(const TrackedSlice& slice, const std::vector<Dro
   record.pixel_mm = {plane.column_spacing_mm, plane.row_spacing_mm};
   for (const TagWave& wave : slice.tracked.waves)
     record.directions.push_back(
-        {std::atan2(wave.per_mm.y(), wave.per_mm.x()) * 180 / std::numbers::pi, wave.spacing_mm()});
+        {std::atan2(wave.per_mm.y(), wave.per_mm.x()) / rad_per_deg, wave.spacing_mm()});
   const float white = white_of(slice.view.images);
   const std::vector<PhaseSummary> summaries = phase_summaries(slice);
   for (size_t k = 0; k < slice.view.images.size(); ++k) {

@@ -4,6 +4,7 @@
 
 #include "estimator/explain/rig/next_experiment.hpp"
 #include "estimator/explain/rig/set_fit.hpp"
+#include "estimator/inference/information.hpp"
 #include "estimator/rig_fit/simulated_session.hpp"
 #include "host/config/experiment.hpp"
 
@@ -106,7 +107,8 @@ TEST(NextExperiment, AnImageAtRestTellsARadiusFromSlippingEnds) {
   const Equipment image{true, false, false, true};
   const SpecimenKnowledge knowledge{.inner_radius_mm = 22.5};
   const auto apart = [&](const FittedModel& truth, const FittedModel& adapting) {
-    return separation(gram_beside(fitted.problem, truth, adapting, image, knowledge), known_before(adapting));
+    return inference::separation(gram_beside(fitted.problem, truth, adapting, image, knowledge),
+                                 known_before(adapting));
   };
   const double seen = 22.5 * std::abs(radius.model.values[0]) / knowledge.radius_error_mm;
   EXPECT_GT(seen, 1.0);

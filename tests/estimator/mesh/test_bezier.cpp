@@ -40,10 +40,8 @@ TEST(Bezier, FormThroughSamplesIsTheCubicThatWasSampled) {
   const auto cubic = [](const Xi& xi) {
     return 1.0 + xi[0] * xi[0] * xi[0] * xi[2] - 2.0 * xi[1] * xi[1] + xi[0] * xi[1] * xi[2] * xi[2] * xi[2];
   };
-  Eigen::MatrixXd samples(bezier_points, 1);
-  for (size_t q = 0; q < bezier_points; ++q)
-    samples(static_cast<Eigen::Index>(q), 0) = cubic({at[q & 3], at[(q >> 2) & 3], at[q >> 4]});
-  const Eigen::MatrixXd control = bezier_through(at, samples);
+  const Eigen::MatrixXd control = bezier_through(
+      at, [&](const Xi& xi) -> Eigen::VectorXd { return Eigen::VectorXd::Constant(1, cubic(xi)); });
   for (const Xi& xi : {Xi{0, 0, 0}, Xi{1, 0.5, 0.25}, Xi{0.3, 1, 1}})
     EXPECT_NEAR((control.transpose() * weights_at(xi))(0), cubic(xi), 1e-12);
 }

@@ -13,6 +13,7 @@
 #include "estimator/report/cine.hpp"
 #include "host/web/console_stream.hpp"
 #include "host/web/door.hpp"
+#include "host/web/listen.hpp"
 #include "host/web/request.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tools/diastole/desk/embedded.hpp"
@@ -150,17 +151,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
 struct DeskServer::Impl {
   Impl(DeskPages& pages, uint16_t port)
       : desk(pages, web::Door({asio::ip::address_v4::loopback(), port}, "")), acceptor(context) {
-    const tcp::endpoint endpoint(asio::ip::address_v4::loopback(), port);
-    try {
-      acceptor.open(endpoint.protocol());
-      acceptor.set_option(asio::socket_base::reuse_address(true));
-      acceptor.bind(endpoint);
-      acceptor.listen();
-    } catch (const boost::system::system_error& error) {
-      throw HardwareError("desk",
-                          fmt::format("cannot listen at 127.0.0.1:{}: {}", port, error.code().message()),
-                          "Choose another port (--port), or see who has this one (ss -ltnp).");
-    }
+    web::listen_at(acceptor, {asio::ip::address_v4::loopback(), port}, "desk", "--port");
   }
 
   void accept() {

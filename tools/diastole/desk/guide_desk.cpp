@@ -8,6 +8,7 @@
 #include <cmath>
 #include <set>
 #include <stdexcept>
+#include <utility>
 
 #include "estimator/imaging/geometry/cine_points.hpp"
 #include "estimator/imaging/geometry/wall_outline.hpp"
@@ -16,6 +17,7 @@
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/json_text.hpp"
+#include "protocol/signal/median.hpp"
 #include "tools/diastole/desk/embedded.hpp"
 
 namespace diastole::desk {
@@ -111,13 +113,12 @@ void GuideDesk::require_in_slices() const {
     for (const auto& [id, point] : points_)
       if (point.slice == s) apart_mm.push_back(std::abs(plane.across_mm(point.place_mm)));
     if (apart_mm.empty()) continue;
-    const auto middle = apart_mm.begin() + static_cast<std::ptrdiff_t>(apart_mm.size() / 2);
-    std::ranges::nth_element(apart_mm, middle);
+    const double usual_mm = signal::median(std::move(apart_mm));
     constexpr double usual_thickness_mm = 5;
     const double thickness_mm = plane.thickness_mm > 0 ? plane.thickness_mm : usual_thickness_mm;
-    if (*middle > 0.5 * thickness_mm)
+    if (usual_mm > 0.5 * thickness_mm)
       throw InputError({file_.string(), fmt::format("slice {}", cines_.slices[s].name),
-                        fmt::format("its points lie {:.1f} mm from the images that are called so", *middle),
+                        fmt::format("its points lie {:.1f} mm from the images that are called so", usual_mm),
                         fmt::format("Give the points of this study; without a file they are found in {}.",
                                     cines_.folder.string())});
   }

@@ -1,4 +1,4 @@
-#include "estimator/imaging/flow/periodic_curve.hpp"
+#include "estimator/imaging/flow/periodic_regression.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -62,25 +62,25 @@ Regression regressed(const Eigen::MatrixXd& design, const Eigen::VectorXd& value
 
 }  // namespace
 
-Eigen::VectorXd PeriodicCurve::value_row(double t) const {
+Eigen::VectorXd PeriodicRegression::value_row(double t) const {
   return row_of(period_s, coefficients.size(), 1.0,
                 [t](double w) { return std::pair(std::cos(w * t), std::sin(w * t)); });
 }
-Eigen::VectorXd PeriodicCurve::slope_row(double t) const {
+Eigen::VectorXd PeriodicRegression::slope_row(double t) const {
   return row_of(period_s, coefficients.size(), 0.0,
                 [t](double w) { return std::pair(-w * std::sin(w * t), w * std::cos(w * t)); });
 }
-Eigen::VectorXd PeriodicCurve::integral_row(double t) const {
+Eigen::VectorXd PeriodicRegression::integral_row(double t) const {
   return row_of(period_s, coefficients.size(), t,
                 [t](double w) { return std::pair(std::sin(w * t) / w, (1 - std::cos(w * t)) / w); });
 }
-double PeriodicCurve::sigma_of(const Eigen::VectorXd& row) const {
+double PeriodicRegression::sigma_of(const Eigen::VectorXd& row) const {
   return std::sqrt(std::max(0.0, row.dot(covariance * row)));
 }
 
-PeriodicCurve periodic_curve(const Eigen::VectorXd& time_s, const Eigen::VectorXd& values,
-                             const Eigen::MatrixXd& covariance, double period_s) {
-  PeriodicCurve curve;
+PeriodicRegression periodic_regression(const Eigen::VectorXd& time_s, const Eigen::VectorXd& values,
+                                       const Eigen::MatrixXd& covariance, double period_s) {
+  PeriodicRegression curve;
   curve.period_s = period_s;
   const Eigen::Index size = 1 + bandwidths * values.size();
   curve.coefficients = Eigen::VectorXd::Zero(size);
@@ -110,8 +110,8 @@ PeriodicCurve periodic_curve(const Eigen::VectorXd& time_s, const Eigen::VectorX
   return curve;
 }
 
-PeriodicCurve closed(const PeriodicCurve& curve) {
-  PeriodicCurve result = curve;
+PeriodicRegression closed(const PeriodicRegression& curve) {
+  PeriodicRegression result = curve;
   const Eigen::VectorXd with_mean = curve.covariance.col(0);
   const double variance = with_mean[0];
   result.coefficients -= with_mean * (curve.coefficients[0] / variance);

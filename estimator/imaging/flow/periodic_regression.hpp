@@ -10,7 +10,7 @@
 
 namespace diastole::imaging {
 
-struct PeriodicCurve {
+struct PeriodicRegression {
   double period_s = 0;
   double smoothness = 0;         ///< m
   Eigen::VectorXd coefficients;  ///< c_0, a_1, b_1, a_2, ...
@@ -25,10 +25,10 @@ struct PeriodicCurve {
 };
 
 /// Preconditions: as many times as values, all within one period of each other; a covariance that is positive definite.
-PeriodicCurve periodic_curve(const Eigen::VectorXd& time_s, const Eigen::VectorXd& values,
-                             const Eigen::MatrixXd& covariance, double period_s);
+PeriodicRegression periodic_regression(const Eigen::VectorXd& time_s, const Eigen::VectorXd& values,
+                                       const Eigen::MatrixXd& covariance, double period_s);
 
 /// The same curve, given that the mean over a period is zero: of all curves that the errors allow the likeliest that closes.
-PeriodicCurve closed(const PeriodicCurve& curve);
+PeriodicRegression closed(const PeriodicRegression& curve);
 
 }  // namespace diastole::imaging

@@ -1,4 +1,4 @@
-#include "estimator/imaging/flow/periodic_curve.hpp"
+#include "estimator/imaging/flow/periodic_regression.hpp"
 
 #include <gtest/gtest.h>
 
@@ -36,9 +36,9 @@ Samples samples(double sigma, double offset, unsigned seed, int count = 16) {
   return made;
 }
 
-TEST(PeriodicCurve, IntegralAndSlopeAreThoseOfTheValue) {
+TEST(PeriodicRegression, IntegralAndSlopeAreThoseOfTheValue) {
   const Samples data = samples(0.1, 1.0, 1);
-  const PeriodicCurve curve = periodic_curve(data.time_s, data.values, data.covariance, period_s);
+  const PeriodicRegression curve = periodic_regression(data.time_s, data.values, data.covariance, period_s);
   constexpr double t = 0.37, h = 1e-4;
   const auto value = [&](double at) { return curve.of(curve.value_row(at)); };
   EXPECT_NEAR(curve.of(curve.slope_row(t)), (value(t + h) - value(t - h)) / (2 * h), 1e-4);
@@ -47,12 +47,12 @@ TEST(PeriodicCurve, IntegralAndSlopeAreThoseOfTheValue) {
   EXPECT_NEAR(value(0), value(period_s), 1e-9);
 }
 
-TEST(PeriodicCurve, ItsErrorsCoverTheTruthBetweenTheSamples) {
+TEST(PeriodicRegression, ItsErrorsCoverTheTruthBetweenTheSamples) {
   int within = 0, all = 0;
   double squares = 0;
   for (unsigned seed = 1; seed <= 40; ++seed) {
     const Samples data = samples(0.5, 2.0, seed);
-    const PeriodicCurve curve = periodic_curve(data.time_s, data.values, data.covariance, period_s);
+    const PeriodicRegression curve = periodic_regression(data.time_s, data.values, data.covariance, period_s);
     for (const double t : {0.0, 0.21, 0.5, 0.93}) {
       const Eigen::VectorXd row = curve.value_row(t);
       const double z = (curve.of(row) - course(t, 2.0)) / curve.sigma_of(row);
@@ -67,14 +67,14 @@ TEST(PeriodicCurve, ItsErrorsCoverTheTruthBetweenTheSamples) {
   EXPECT_LT(squares, 1.5 * all);
 }
 
-TEST(PeriodicCurve, WhatACycleDoesNotReturnIsFoundAndCanBeTakenOff) {
+TEST(PeriodicRegression, WhatACycleDoesNotReturnIsFoundAndCanBeTakenOff) {
   Samples data = samples(0.2, 1.5, 3);
   data.covariance.array() += 4.0;  // an error that all samples share, as a background's
-  const PeriodicCurve open = periodic_curve(data.time_s, data.values, data.covariance, period_s);
+  const PeriodicRegression open = periodic_regression(data.time_s, data.values, data.covariance, period_s);
   const Eigen::VectorXd whole = open.integral_row(period_s);
   EXPECT_NEAR(open.of(whole), 1.5 * period_s, 0.1);
   EXPECT_NEAR(open.sigma_of(whole), 2.0 * period_s, 0.2);
-  const PeriodicCurve shut = closed(open);
+  const PeriodicRegression shut = closed(open);
   EXPECT_NEAR(shut.of(whole), 0, 1e-9);
   EXPECT_NEAR(shut.sigma_of(whole), 0, 1e-6);
   // The shared error goes with it.
