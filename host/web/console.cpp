@@ -34,10 +34,10 @@ class ConsoleServer::Listener {
   Listener(std::shared_ptr<RpcState> rpc_state, const ConsoleAddress& address,
            const std::filesystem::path& certificate)
       : state_(std::make_shared<ServerState>(
-            ServerState{std::move(rpc_state), Door(address, machine_name()), std::nullopt})),
+            ServerState{std::move(rpc_state), AccessPolicy(address, machine_name()), std::nullopt})),
         acceptor_(std::make_shared<Acceptor<tcp>>(
             state_->rpc_state, "a browser",
-            [state = state_](tcp::socket socket) { receive_visitor(state, std::move(socket)); })) {
+            [state = state_](tcp::socket socket) { accept_connection(state, std::move(socket)); })) {
     tcp::acceptor& acceptor = acceptor_->acceptor;
     const tcp::endpoint endpoint(address.address, address.port);
     try {
@@ -52,7 +52,7 @@ class ConsoleServer::Listener {
                           "Choose another port (--console PORT), or see who has this one (ss -ltnp).");
     }
     nlohmann::json& console = state_->rpc_state->console;
-    if (state_->door.reaches_beyond_this_machine()) encrypt(certificate);
+    if (state_->policy.reaches_beyond_this_machine()) encrypt(certificate);
     console["control"] = url(ConsoleRole::control);
     console["watch"] = url(ConsoleRole::watch);
   }
@@ -61,13 +61,13 @@ class ConsoleServer::Listener {
 
   void close() {
     acceptor_->close();
-    close_all(state_->visitors);
+    close_all(state_->http_connections);
     close_all(state_->consoles);
     state_->rpc_state->console = nullptr;
   }
 
   [[nodiscard]] std::string url(ConsoleRole role) const {
-    return state_->door.url(role, acceptor_->acceptor.local_endpoint().port());
+    return state_->policy.url(role, acceptor_->acceptor.local_endpoint().port());
   }
 
  private:
