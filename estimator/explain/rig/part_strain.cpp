@@ -5,7 +5,9 @@
 
 namespace diastole::explain {
 
-double seldom(double sds) { return boost::math::cdf(boost::math::complement(boost::math::normal(), sds)); }
+double upper_tail(double sds) {
+  return boost::math::cdf(boost::math::complement(boost::math::normal(), sds));
+}
 
 double largest_tolerance(const rig::SessionProblem& problem, const rig::SessionModel& model,
                          const Eigen::VectorXd& u) {
@@ -26,7 +28,7 @@ double fineness(const rig::SessionProblem& problem, const rig::SessionModel& mod
 double strain_by_chance(const rig::SessionProblem& problem, const rig::SessionModel& model,
                         const Eigen::VectorXd& u) {
   const auto tolerances = static_cast<double>(problem.nuisances().size() - rig::basic_nuisances);
-  return -std::expm1(tolerances * std::log1p(-2.0 * seldom(largest_tolerance(problem, model, u))));
+  return -std::expm1(tolerances * std::log1p(-2.0 * upper_tail(largest_tolerance(problem, model, u))));
 }
 
 bool is_strained(const rig::SessionProblem& problem, const EffectSet& set) {

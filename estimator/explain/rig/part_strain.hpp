@@ -9,7 +9,7 @@ namespace diastole::explain {
 inline constexpr double surprising_by_chance = 0.0228, surprising_sds = 2.0;
 
 /// How often a normal error lies further to one side.
-double seldom(double sds);
+double upper_tail(double sds);
 
 /// Of the tolerances `u` (or what ends with them) of a model the one furthest from its prior, in sds of the list or of
 /// what references left: to be a little coarser than in a fine rig is no strain.

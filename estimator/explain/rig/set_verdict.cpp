@@ -155,7 +155,7 @@ double irregularity_by_chance(const rig::SessionProblem& problem,
     const auto group = channel.signal == rig::Signal::pump ? rig::ErrorGroup::pump : rig::ErrorGroup::cavity;
     const double least_kPa = rig::SharePrior::least[static_cast<size_t>(group)] *
                              problem.error().range[static_cast<size_t>(channel.signal)];
-    if (channel.rms_kPa > least_kPa) least = std::min(least, seldom(channel.sds));
+    if (channel.rms_kPa > least_kPa) least = std::min(least, upper_tail(channel.sds));
   }
   return least;
 }
@@ -186,7 +186,7 @@ double name_by_chance(const rig::SessionProblem& problem, const EffectSet& set, 
   error.noise += right_to * right_to * sizes.changed;
   const rig::EvidenceFit again = fit_with_shares(set.target(), set.columns, error, set.evidence.shares);
   const auto parts = static_cast<double>(parts_of(error));
-  return std::min(parts * seldom(std::ranges::max(again.surprise(error.prior))),
+  return std::min(parts * upper_tail(std::ranges::max(again.surprise(error.prior))),
                   strain_in_all_by_chance(problem, set, again.u.tail(set.model.u.size())));
 }
 
@@ -200,7 +200,7 @@ double held_out_odds(double held_out_gain, size_t effects) {
 /// are as seldom together (Fisher 1925: minus two ln of their product is chi-square on four). 0 of a search that did not settle.
 double nothing_wrong_by_chance(const rig::SessionProblem& problem, const EffectSet& set) {
   if (!inference::is_settled(set.termination)) return 0.0;
-  const double misfit = seldom(std::ranges::max(set.evidence.surprise(problem.error().prior)));
+  const double misfit = upper_tail(std::ranges::max(set.evidence.surprise(problem.error().prior)));
   const double strain = strain_by_chance(problem, set.model, set.model.u);
   const double product = misfit * strain;
   const double together = product > 0.0 ? product * (1.0 - std::log(product)) : 0.0;
@@ -209,7 +209,7 @@ double nothing_wrong_by_chance(const rig::SessionProblem& problem, const EffectS
 
 /// That a model is wrong of which what is seen is so seldom by chance, at even odds before: the most that a p-value can mean
 /// (Sellke, Bayarri and Berger 2001).
-double wrong_if_seldom(double by_chance) {
+double probability_wrong(double by_chance) {
   if (by_chance <= 0.0) return 1.0;
   constexpr double says_nothing = 1.0 / std::numbers::e;
   return by_chance < says_nothing ? 1.0 / (1.0 - std::numbers::e * by_chance * std::log(by_chance)) : 0.5;
@@ -334,7 +334,7 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const WeighedSets& sea
   if (by_chance <= surprising_by_chance || is_irregular || !settled) {
     out.verdict = Verdict::unexplained;
     out.confidence =
-        settled ? wrong_if_seldom(is_irregular ? std::min(by_chance, irregular) : by_chance) : 0.5;
+        settled ? probability_wrong(is_irregular ? std::min(by_chance, irregular) : by_chance) : 0.5;
     return out;
   }
   if (out.confidence < name_probability) {
@@ -360,7 +360,7 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const WeighedSets& sea
   out.verdict = is_clean ? Verdict::none : is_more && predicted ? Verdict::named : Verdict::unexplained;
   if (out.verdict == Verdict::unexplained)
     out.confidence = std::max(predicted ? 0.0 : 1.0 / (1.0 + std::exp(odds)),
-                              out.tone ? wrong_if_seldom(out.tone->p_value) : 0.0);
+                              out.tone ? probability_wrong(out.tone->p_value) : 0.0);
   return out;
 }
 
