@@ -119,7 +119,7 @@ std::string to_json(const std::vector<BenchTest>& tests, const LawComparison& co
     }
     of_law["left_out"] = left_out;
     of_law["predicted_percent"] = written(law.predicted_percent);
-    of_law["told_apart"] = law.told_apart;
+    of_law["told_apart"] = law.distinguished;
   }
   const auto& preferred = comparison.preferred;
   const Json json = {

@@ -22,7 +22,7 @@ namespace {
 constexpr std::array output_kinds{vtkhdf_kind,
                                   OutputKind{".csv", "frame,X_mm,Y_mm,Z_mm,x_mm,y_mm,z_mm,sigma_mm"},
                                   OutputKind{".json", reconstruction_file_mark}};
-constexpr double patience_s = 2.0;
+constexpr double silent_s = 2.0;
 
 struct ReconstructArguments {
   StudyOptions study;
@@ -50,7 +50,7 @@ ReconstructionOptions options_of(const ReconstructArguments& arguments) {
   }
   options.on_frame = [begun = Clock::now()](size_t done, size_t of) {
     const double elapsed_s = seconds_since(begun);
-    if (elapsed_s > patience_s)
+    if (elapsed_s > silent_s)
       fmt::print(stderr, "reconstruct: {} of {} frames, {:.0f} s\n", done, of, elapsed_s);
   };
   return options;

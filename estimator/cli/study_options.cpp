@@ -62,9 +62,9 @@ void remark_on_size(const HermiteMesh& mesh, std::string_view command) {
 }
 
 SolveOptions with_progress(std::string_view command) {
-  constexpr double patience_s = 2.0, pause_s = 1.0;
+  constexpr double silent_s = 2.0, pause_s = 1.0;
   SolveOptions options;
-  options.on_iteration = [begun = Clock::now(), next_s = patience_s, command](
+  options.on_iteration = [begun = Clock::now(), next_s = silent_s, command](
                              double pressure_kPa, const NewtonIteration& iteration) mutable {
     const double elapsed_s = seconds_since(begun);
     if (elapsed_s < next_s) return;

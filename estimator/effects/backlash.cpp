@@ -14,7 +14,7 @@ constexpr double least_play_mL = 0.02;
 
 /// The play operator: the piston is moved along by the ends of a gap. It is followed in steps so short that a sample, the
 /// mean around it, is smooth in when contact is made.
-std::vector<double> taken_up(double backlash_mL, double slack_mL, const rig::DriveTrace& command) {
+std::vector<double> play_operator(double backlash_mL, double slack_mL, const rig::DriveTrace& command) {
   constexpr size_t parts = 8;
   const size_t count = command.volume_mL.size();
   std::vector<double> piston_mL(count, 0.0);
@@ -92,7 +92,7 @@ Effect backlash_effect() {
             if (backlash_mL == 0.0) return;
             model.has_corners = true;
             model.drive.emplace_back([=](rig::DriveTrace& trace, const rig::RunPlace&) {
-              trace.volume_mL = smoothed(taken_up(backlash_mL, slack_mL, trace),
+              trace.volume_mL = smoothed(play_operator(backlash_mL, slack_mL, trace),
                                          normal_weights(std::max(contact_s / trace.step_s, 1e-3)));
               trace.differentiate();
             });

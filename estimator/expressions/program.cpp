@@ -43,9 +43,9 @@ Program::Program(const Graph& graph, std::span<const NodeId> outputs) {
       if (registers_ == most_registers) throw std::length_error("the formulas are too long");
       return static_cast<Register>(registers_++);
     }
-    const Register taken = free.back();
+    const Register allocated = free.back();
     free.pop_back();
-    return taken;
+    return allocated;
   };
   for (const NodeId id : order) {  // what is loaded stands first and is loaded once
     const Node& node = graph[id];

@@ -115,16 +115,16 @@ ElasticState ElasticSystem::rest_state() const {
   ElasticState state;
   state.position_mm = mesh_.reference();
   state.lagrange_pressure_kPa.assign(pressures_.count, 0.0);
-  std::vector<double> sharers(pressures_.count, 0.0);
+  std::vector<double> element_counts(pressures_.count, 0.0);
   for (size_t e = 0; e < mesh_.element_count(); ++e) {
     const double mean_stress = rest_pressure_kPa(e);
     for (const size_t unknown : pressures_.unknown[e]) {
       state.lagrange_pressure_kPa[unknown] += mean_stress;
-      sharers[unknown] += 1.0;
+      element_counts[unknown] += 1.0;
     }
   }
   for (size_t i = 0; i < pressures_.count; ++i)
-    state.lagrange_pressure_kPa[i] /= sharers[i];
+    state.lagrange_pressure_kPa[i] /= element_counts[i];
   return state;
 }
 

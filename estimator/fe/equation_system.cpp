@@ -133,13 +133,13 @@ void EquationSystem::colour_elements() {
   for (size_t e = 0; e < maps_.size(); ++e) {
     const std::span nodes(maps_[e].nodes.data(), maps_[e].hosts);
     size_t colour = 0;
-    const auto taken = [&](size_t candidate) {
+    const auto is_used = [&](size_t candidate) {
       return std::any_of(nodes.begin(), nodes.end(), [&](size_t node) {
         return std::find(colours_of_node[node].begin(), colours_of_node[node].end(), candidate) !=
                colours_of_node[node].end();
       });
     };
-    while (taken(colour))
+    while (is_used(colour))
       ++colour;
     for (const size_t node : nodes)
       colours_of_node[node].push_back(colour);

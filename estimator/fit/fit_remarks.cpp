@@ -9,15 +9,15 @@
 namespace diastole {
 namespace {
 
-constexpr double telling_offset =
+constexpr double significant_offset =
     3.5;  // standard deviations: one of two thousand sound measurements is suspected
-constexpr double telling_deviation = 4.0;  // standard deviations of chi2/dof that chance does not explain
+constexpr double significant_deviation = 4.0;  // standard deviations of chi2/dof that chance does not explain
 
-constexpr double telling_correlation = 0.8;
+constexpr double strong_correlation = 0.8;
 constexpr size_t most_pairs = 6;
 constexpr double small_share = 0.1;       // of a direction: not worth a word
 constexpr double unseen_relative_sd = 1;  // beyond this a value is known by its bounds only
-constexpr double lopsided = 5.0;          // largest over smallest standard deviation worth reporting
+constexpr double unbalanced = 5.0;        // largest over smallest standard deviation worth reporting
 
 /// How far chi2/dof is from 1, in its own standard deviations sqrt(2/dof).
 double deviation(double chi2_per_dof, double dof) { return (chi2_per_dof - 1) / std::sqrt(2 / dof); }
@@ -26,13 +26,13 @@ std::string remark_on_misfit(const FitRecord& record) {
   const double off = deviation(record.chi2_per_dof, static_cast<double>(record.dof));
   const std::string figure =
       fmt::format("chi2/dof = {:.3f}, {:.1f} standard deviations from 1", record.chi2_per_dof, off);
-  if (off > telling_deviation) {
+  if (off > significant_deviation) {
     return fmt::format(
         "The residuals are larger than the stated noise ({}): the model lacks something, or sigma_mm is "
         "stated too small. The interval holds only if neither matters.",
         figure);
   }
-  if (off < -telling_deviation) {
+  if (off < -significant_deviation) {
     return fmt::format(
         "The residuals are smaller than the stated noise ({}): sigma_mm is stated too large, or the points' "
         "errors are not independent.",
@@ -43,27 +43,27 @@ std::string remark_on_misfit(const FitRecord& record) {
 
 /// Under a robust loss: wild residuals would dominate chi2/dof, so that only the others' core is compared.
 std::string remark_on_core(const FitOutcome& fit) {
-  constexpr double telling_factor = 1.2;
+  constexpr double notable_factor = 1.2;
   std::vector<double> all;
   for (const EstimatedFrame& frame : fit.frames)
     all.insert(all.end(), frame.weighted.begin(), frame.weighted.end());
   const double core =
       core_deviation(Eigen::Map<const Eigen::VectorXd>(all.data(), static_cast<Eigen::Index>(all.size())));
   const std::string figure = fmt::format("their core spreads {:.2f} times as far as stated", core);
-  if (core > telling_factor) {
+  if (core > notable_factor) {
     return fmt::format(
         "Even the residuals that are not wild are larger than the stated noise ({}): the model lacks "
         "something, or sigma_mm is stated too small.",
         figure);
   }
-  if (core < 1 / telling_factor)
+  if (core < 1 / notable_factor)
     return fmt::format("The residuals are smaller than the stated noise ({}).", figure);
   return fmt::format("Apart from the wild ones, the residuals spread as the stated noise says ({}).", figure);
 }
 
 void add_alike(std::vector<std::string>& remarks, const FitOutcome& fit) {
-  constexpr double telling_factor = 1.2;
-  if (fit.alike < telling_factor) return;
+  constexpr double notable_factor = 1.2;
+  if (fit.alike < notable_factor) return;
   remarks.push_back(
       fmt::format("Residuals of neighbouring tags are alike, as a ghost or a fold in the images makes them: "
                   "standard errors are {:.2g} times those of independent ones.",
@@ -182,7 +182,7 @@ void add_offset(std::vector<std::string>& remarks, const FitRecord& record, cons
   if (!fit.converged() || !fit.offset_score) return;
   const OffsetScore& offset = *fit.offset_score;
   const double deviations = std::abs(offset.value_kPa) / offset.se_kPa;
-  if (!(deviations > telling_offset)) return;
+  if (!(deviations > significant_offset)) return;
   remarks.push_back(
       fmt::format("The pressures seem to read {:.3g} ± {:.2g} kPa too {} ({:.1f} standard deviations): with "
                   "that the frames agree better, and the values would be about {}. Check the catheter's "
@@ -198,7 +198,7 @@ void add_pressures(std::vector<std::string>& remarks, const FitOutcome& fit) {
     return frame.by_motion ? std::abs(frame.by_motion->reading_off) : 0.0;
   };
   const auto contradicted =
-      std::ranges::count_if(fit.frames, [&](const auto& frame) { return off(frame) > telling_offset; });
+      std::ranges::count_if(fit.frames, [&](const auto& frame) { return off(frame) > significant_offset; });
   if (contradicted == 0) return;
   const EstimatedFrame& worst = *std::ranges::max_element(fit.frames, {}, off);
   remarks.push_back(fmt::format(
@@ -214,7 +214,7 @@ void add_undeformed(std::vector<std::string>& remarks, const FitRecord& record) 
   if (record.undeformed.points == 0) return;
   const double off =
       deviation(record.undeformed.chi2_per_residual, static_cast<double>(record.undeformed.residuals));
-  if (off > telling_deviation) {
+  if (off > significant_deviation) {
     remarks.push_back(fmt::format(
         "Frame 0 contradicts the data's own frame of reference: its {} points miss their undeformed places "
         "by more than the noise (chi2/residual = {:.2f}, mean {:+.3f} mm). Check plane_mm, the axes, and "
@@ -245,7 +245,7 @@ std::vector<Pair> trading_pairs(const FitRecord& record) {
   for (size_t i = 0; i < correlation.names.size(); ++i) {
     for (size_t j = 0; j < i; ++j) {
       if (!is_whole(record, correlation.names[i]) || !is_whole(record, correlation.names[j])) continue;
-      if (std::abs(correlation.matrix[i][j]) >= telling_correlation)
+      if (std::abs(correlation.matrix[i][j]) >= strong_correlation)
         pairs.push_back({correlation.names[j], correlation.names[i], correlation.matrix[i][j]});
     }
   }
@@ -280,7 +280,7 @@ void add_identifiability(std::vector<std::string>& remarks, const FitRecord& rec
         fmt::format("The data cannot see this combination: {}. Fix one of these parameters, or add loads "
                     "that tell them apart.",
                     changes(worst)));
-  } else if (worst.relative_sd > lopsided * best.relative_sd) {
+  } else if (worst.relative_sd > unbalanced * best.relative_sd) {
     remarks.push_back(
         fmt::format("The data see this combination worst (one standard deviation): {}; and this one best: "
                     "{}. The first is {:.0f} times less certain.",

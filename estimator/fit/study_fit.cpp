@@ -414,9 +414,9 @@ bool has_unseen_mesh_error(const Study& study, const ElasticModel& model, const 
          });
 }
 
-FitOutcome fit_from_where_it_stands(MotionModel& motion, EstimatedParameters& estimated,
-                                    const Measurement& measurement, const FitOptions& options,
-                                    std::vector<std::string>& remarks) {
+FitOutcome fit_from_current_values(MotionModel& motion, EstimatedParameters& estimated,
+                                   const Measurement& measurement, const FitOptions& options,
+                                   std::vector<std::string>& remarks) {
   const std::string given = start_words(estimated);
   FitOutcome fit = fit_motion(motion, estimated.values, measurement, options);
   const auto failed_at_start = [&] { return !fit.converged() && fit.history.empty(); };
@@ -473,8 +473,7 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
     if (options.on_iteration) options.on_iteration(record_of(step, estimated));
     if (options.on_checkpoint && step.accepted) options.on_checkpoint(checkpoint_of(record, step, estimated));
   };
-  const FitOutcome fit =
-      fit_from_where_it_stands(motion, estimated, measurement, fit_options, record.remarks);
+  const FitOutcome fit = fit_from_current_values(motion, estimated, measurement, fit_options, record.remarks);
 
   record.converged = fit.converged();
   record.reason = fit.reason;

@@ -37,9 +37,9 @@ struct StudyFitOptions {
 FitRecord refused_fit(const Study& study, const Measurement& measurement, std::vector<Finding> findings);
 
 /// fit_motion, begun with a stiffer material where the start values carry no equilibrium; a remark says so.
-FitOutcome fit_from_where_it_stands(MotionModel& motion, EstimatedParameters& estimated,
-                                    const Measurement& measurement, const FitOptions& options,
-                                    std::vector<std::string>& remarks);
+FitOutcome fit_from_current_values(MotionModel& motion, EstimatedParameters& estimated,
+                                   const Measurement& measurement, const FitOptions& options,
+                                   std::vector<std::string>& remarks);
 
 /// How far outside the specimen a point may lie and still be its own.
 LocatorOptions locator_for(const Specimen& specimen);

@@ -15,9 +15,9 @@ struct DeletedResidual {
 /// `derivatives` of the residual by the unknowns, `inverse` of the normal matrix. None where only the measurement itself says it.
 inline std::optional<DeletedResidual> deleted_residual(double residual, const Eigen::VectorXd& derivatives,
                                                        const Eigen::MatrixXd& inverse) {
-  constexpr double told_by_others = 1e-6;  // less is rounding
+  constexpr double determined_by_others = 1e-6;  // less is rounding
   const double share = 1.0 - derivatives.dot(inverse * derivatives);
-  if (!(share > told_by_others)) return std::nullopt;
+  if (!(share > determined_by_others)) return std::nullopt;
   return DeletedResidual{residual / share, share};
 }
 

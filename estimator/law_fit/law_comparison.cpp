@@ -87,7 +87,7 @@ bool lies_above(const Eigen::VectorXd& squares, const Eigen::VectorXd& least) {
 void prefer(LawComparison& comparison) {
   for (size_t i = 0; i < comparison.laws.size(); ++i) {
     const ComparedLaw& law = comparison.laws[i];
-    if (!law.fit.settled || law.told_apart) continue;
+    if (!law.fit.settled || law.distinguished) continue;
     const auto parameters = [&](size_t at) { return comparison.laws[at].fit.parameters.size(); };
     if (!comparison.preferred || parameters(i) < parameters(*comparison.preferred)) comparison.preferred = i;
   }
@@ -157,7 +157,7 @@ LawComparison compare_laws(std::span<const Law* const> laws, const std::vector<B
   const auto least = std::ranges::min_element(comparison.laws, {}, &ComparedLaw::predicted_percent) -
                      comparison.laws.begin();
   for (size_t law = 0; law < laws.size(); ++law)
-    comparison.laws[law].told_apart = lies_above(squares[law], squares[static_cast<size_t>(least)]);
+    comparison.laws[law].distinguished = lies_above(squares[law], squares[static_cast<size_t>(least)]);
   std::ranges::stable_sort(comparison.laws, {}, &ComparedLaw::predicted_percent);
   prefer(comparison);
   return comparison;

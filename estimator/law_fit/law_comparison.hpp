@@ -27,7 +27,7 @@ struct ComparedLaw {
   LawFit fit;                     ///< to all tests
   std::vector<LeftOut> left_out;  ///< one a fold
   double predicted_percent = 0;   ///< over all folds
-  bool told_apart = false;        ///< from the law with the least score
+  bool distinguished = false;     ///< from the law with the least score
 };
 
 struct LawComparison {

@@ -173,7 +173,7 @@ void run_forked(const std::vector<size_t>& jobs, size_t workers, const Work& wor
   size_t next = 0;
   for (Worker& worker : pool.all())
     pool.give(worker, jobs[next++]);
-  for (size_t taken = 0; taken < jobs.size(); ++taken) {
+  for (size_t received = 0; received < jobs.size(); ++received) {
     std::string result;
     Worker& worker = pool.take(result);
     const size_t job = *worker.busy_with;

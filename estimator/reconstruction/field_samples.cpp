@@ -20,7 +20,7 @@ double radical_inverse(size_t i, size_t base) {
 }
 
 /// The field of the residuals, by which smoothing twice differs from smoothing once.
-NodeField second_helping(const FrameField& field) {
+NodeField residual_field(const FrameField& field) {
   Eigen::VectorXd residuals(static_cast<Eigen::Index>(field.rows.size()));
   for (size_t i = 0; i < field.rows.size(); ++i)
     residuals[static_cast<Eigen::Index>(i)] = field.rows[i].rejected ? 0.0 : field.rows[i].residual;
@@ -57,7 +57,7 @@ SampledFrame sample_field(const FrameField& field, std::span<const MaterialPoint
       functionals.push_back(displacement_along(mesh, point, Eigen::Vector3d::Unit(k)));
   }
   const std::vector<double> variances = field.system->variances(functionals);
-  const NodeField more_mm = second_helping(field);
+  const NodeField more_mm = residual_field(field);
   SampledFrame sampled;
   sampled.sigma_factor =
       std::sqrt(std::max(1.0, static_cast<double>(functionals.size()) / sampled_freedoms(field)));

@@ -60,30 +60,30 @@ std::vector<SliceOffset> slice_offsets(const std::vector<FrameField>& fields, co
     all.t += one.t;
     all.of_tags += one.of_tags;
   }
-  std::vector<Eigen::Index> taken;
+  std::vector<Eigen::Index> selected;
   for (;;) {
     // What is left of each slice beside those taken.
-    const Eigen::MatrixXd chosen = all.S(taken, taken);
-    const Eigen::MatrixXd between = all.S(taken, Eigen::all);
+    const Eigen::MatrixXd chosen = all.S(selected, selected);
+    const Eigen::MatrixXd between = all.S(selected, Eigen::all);
     const Eigen::LDLT<Eigen::MatrixXd> factor(chosen);
     const Eigen::VectorXd offsets =
-        taken.empty() ? Eigen::VectorXd() : Eigen::VectorXd(factor.solve(all.t(taken)));
+        selected.empty() ? Eigen::VectorXd() : Eigen::VectorXd(factor.solve(all.t(selected)));
     const Eigen::MatrixXd inverse =
-        taken.empty()
+        selected.empty()
             ? Eigen::MatrixXd()
             : Eigen::MatrixXd(factor.solve(Eigen::MatrixXd::Identity(chosen.rows(), chosen.cols())));
     Eigen::Index best = -1;
     double most = significant;
     for (Eigen::Index s = 0; s < slices; ++s) {
       SliceOffset& offset = result[static_cast<size_t>(s)];
-      const auto found = std::find(taken.begin(), taken.end(), s);
-      if (found != taken.end()) {
-        const Eigen::Index at = found - taken.begin();
+      const auto found = std::find(selected.begin(), selected.end(), s);
+      if (found != selected.end()) {
+        const Eigen::Index at = found - selected.begin();
         offset = {static_cast<size_t>(s), offsets[at], std::sqrt(inverse(at, at)), true};
         continue;
       }
       double information = all.S(s, s), pull = all.t[s];
-      if (!taken.empty()) {
+      if (!selected.empty()) {
         const Eigen::VectorXd column = between.col(s);
         information -= column.dot(factor.solve(column));
         pull -= column.dot(offsets);
@@ -98,7 +98,7 @@ std::vector<SliceOffset> slice_offsets(const std::vector<FrameField>& fields, co
       }
     }
     if (best < 0) return result;
-    taken.push_back(best);
+    selected.push_back(best);
   }
 }
 

@@ -102,7 +102,7 @@ void add_law_comparison(Page& page, const LawComparison& comparison) {
       if (comparison.over_kinds)
         row.push_back(percent_text(left_out.error_percent) + (left_out.determined ? "" : " *"));
     }
-    row.emplace_back(law.told_apart ? "no" : "yes");
+    row.emplace_back(law.distinguished ? "no" : "yes");
     return row;
   };
   page.table_of(comparison.laws, header, row_of,

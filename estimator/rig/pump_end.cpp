@@ -58,23 +58,24 @@ double PumpEnd::leaks_beyond(double pressure_kPa, double time_s) const {
   return flow;
 }
 
-double PumpEnd::pressure_kPa(double taken_mL, double time_s) const {
+double PumpEnd::pressure_kPa(double absorbed_mL, double time_s) const {
   const bool has_gas = springs_ && gas_.present();
   const double compliance = (springs_ ? compliance_mL_per_kPa_ : 0.0) + leaking_s_ * conductance_mL_s_kPa_;
-  if (leaks_.empty()) return has_gas ? gas_.pressure_behind_kPa(taken_mL, compliance) : taken_mL / compliance;
+  if (leaks_.empty())
+    return has_gas ? gas_.pressure_behind_kPa(absorbed_mL, compliance) : absorbed_mL / compliance;
   const auto excess = [&](double pressure_kPa) {
     return compliance * pressure_kPa + (has_gas ? gas_.squeezed_mL(pressure_kPa) : 0.0) +
-           leaking_s_ * leaks_beyond(pressure_kPa, time_s) - taken_mL;
+           leaking_s_ * leaks_beyond(pressure_kPa, time_s) - absorbed_mL;
   };
   // Between none and the linear end's, where all leaks grow with pressure. Regula falsi (Illinois).
   double a = 0.0;
-  double b = taken_mL / linear_;
+  double b = absorbed_mL / linear_;
   double at_a = excess(a);
   double at_b = excess(b);
   constexpr double close = 1e-13;
   for (int doubling = 0; doubling < 8 && at_a * at_b > 0.0; ++doubling)
     at_b = excess(b *= 2.0);
-  for (int step = 0; step < 60 && std::abs(at_b) > close * (std::abs(taken_mL) + 1e-9); ++step) {
+  for (int step = 0; step < 60 && std::abs(at_b) > close * (std::abs(absorbed_mL) + 1e-9); ++step) {
     const double next = b - at_b * (b - a) / (at_b - at_a);
     const double at_next = excess(next);
     if (at_next * at_b < 0.0) {
@@ -93,8 +94,8 @@ double PumpEnd::pressure_kPa(double taken_mL, double time_s) const {
 double PumpEnd::load_kPa(double yielded_mL, double yielding_mL_per_s, double time_s) const {
   if (linear_ == 0.0) return 0.0;
   if (!springs_) return pressure_kPa(-yielding_mL_per_s, time_s) + yielding_mL_per_s / linear_;
-  const double taken_mL = -yielded_mL - damping_s_ * yielding_mL_per_s;
-  return pressure_kPa(taken_mL - leaked_mL_, time_s) - taken_mL / linear_;
+  const double absorbed_mL = -yielded_mL - damping_s_ * yielding_mL_per_s;
+  return pressure_kPa(absorbed_mL - leaked_mL_, time_s) - absorbed_mL / linear_;
 }
 
 void PumpEnd::pass(double cylinder_kPa, double time_s) {

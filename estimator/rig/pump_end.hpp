@@ -35,7 +35,7 @@ class PumpEnd {
   /// What leaks beyond the conductance, mL/s.
   [[nodiscard]] double leaks_beyond(double pressure_kPa, double time_s) const;
   /// The pressure at which drive, gas and leaks have taken this volume.
-  [[nodiscard]] double pressure_kPa(double taken_mL, double time_s) const;
+  [[nodiscard]] double pressure_kPa(double absorbed_mL, double time_s) const;
 
   double step_s_;
   double compliance_mL_per_kPa_;  ///< of the drive

@@ -136,11 +136,11 @@ EvidenceFit solve(const VectorXd& z, const Eigen::MatrixXd& columns, const Model
     fit.log_evidence -= 0.5 * sigma * sigma;
   if (curvature == nullptr) return fit;
   // The inverse of D + K K' times z is left / D; its diagonal is 1/D less what the columns take.
-  const Eigen::MatrixXd taken = factor.matrixL().solve(weighted.transpose());
+  const Eigen::MatrixXd explained = factor.matrixL().solve(weighted.transpose());
   for (Index i = 0; i < z.size(); ++i) {
     const auto g = static_cast<size_t>(error.group[static_cast<size_t>(i)]);
     const double models = square(shares[g]) * error.unit[i];
-    const double diagonal = weight[i] - taken.col(i).squaredNorm();
+    const double diagonal = weight[i] - explained.col(i).squaredNorm();
     curvature->slope[g] += models * (square(fit.left[i] * weight[i]) - diagonal);
     curvature->information[g] += 2.0 * square(models * diagonal);
   }

@@ -58,7 +58,7 @@ BootDecision decide(std::span<const std::uint8_t> records, const std::array<Slot
   BootDecision decision;
   for (std::size_t i = 0; i < slots.size(); ++i)
     decision.state[i] = state_of(slots[i], last[i].event, half_erased(i));
-  const auto youngest = [&](ImageState wanted) {
+  const auto newest = [&](ImageState wanted) {
     ImageSlot found = ImageSlot::none;
     int found_age = -1;
     for (std::size_t i = 0; i < slots.size(); ++i) {
@@ -70,8 +70,8 @@ BootDecision decide(std::span<const std::uint8_t> records, const std::array<Slot
   };
 
   for (const ImageState state : {ImageState::confirmed, ImageState::unrecorded, ImageState::failed})
-    if (decision.keep == ImageSlot::none) decision.keep = youngest(state);
-  const ImageSlot installed = youngest(ImageState::installed);
+    if (decision.keep == ImageSlot::none) decision.keep = newest(state);
+  const ImageSlot installed = newest(ImageState::installed);
   const ImageSlot kept = decision.keep != ImageSlot::none ? decision.keep : installed;
   decision.trial = installed != ImageSlot::none && records_left(records) > 0;
   decision.start = decision.trial ? installed : kept;

@@ -34,7 +34,7 @@ struct Start {
 /// How long a host may ask for the bootloader after a reset.
 inline constexpr std::uint64_t kStayWindow_us = 30'000;
 /// After this silence of the line a bootloader with something to start starts it.
-inline constexpr std::uint64_t kPatience_us = 30'000'000;
+inline constexpr std::uint64_t kIdleTimeout_us = 30'000'000;
 /// Of the bootloader itself, as Hello reports it.
 inline constexpr wire::FirmwareVersion kBootloaderVersion{1, 1, 0};
 
@@ -132,7 +132,7 @@ bool Bootloader<H>::serve_turn() {
   hardware_.idle();
   const std::uint64_t now_us = hardware_.now_us();
   if (leave_at_us_) return now_us < *leave_at_us_ && !link_.idle();
-  if (now_us - heard_us_ < kPatience_us) return true;
+  if (now_us - heard_us_ < kIdleTimeout_us) return true;
   heard_us_ = now_us;
   return decide(hardware_).start == wire::ImageSlot::none;
 }

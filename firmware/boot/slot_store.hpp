@@ -76,7 +76,7 @@ inline bool is_erased(std::span<const std::uint8_t> bytes) {
 
 /// Whether the board takes an image with this header from who signed it, whatever its code holds; 14 million cycles.
 template <SlotStore S>
-wire::UpdateOutcome vouched_for(const S& store, wire::SignedHeader header, std::uint32_t counter) {
+wire::UpdateOutcome check_signature(const S& store, wire::SignedHeader header, std::uint32_t counter) {
   if (is_erased(store.signing_key())) return wire::UpdateOutcome::done;
   if (!wire::has_signature_block(header) || is_erased(wire::signature_part(header)))
     return wire::UpdateOutcome::not_signed;
@@ -98,7 +98,7 @@ BootDecision decide(const S& store) {
       const auto index = static_cast<std::size_t>(slot);
       if (slot == wire::ImageSlot::none || judged[index]) continue;
       judged[index] = true;
-      if (vouched_for(store, signed_header_in(store.slot(slot)), counter) == wire::UpdateOutcome::done)
+      if (check_signature(store, signed_header_in(store.slot(slot)), counter) == wire::UpdateOutcome::done)
         continue;
       facts[index].verified = false;
       facts[index].refused = changed = true;

@@ -43,7 +43,7 @@ class UpdateSession {
   [[nodiscard]] bool still_erased() const {
     return last_of_slot(store_.records(), slot_) == BootEvent::erased && is_erased(store_.slot(slot_));
   }
-  bool make_room(const wire::BeginUpdate& request);
+  bool prepare_slot(const wire::BeginUpdate& request);
   bool compact_records(const BootDecision& decision);
 
   S& store_;
@@ -71,7 +71,7 @@ UpdateReply UpdateSession<S>::judge(const wire::ImageHeader& header, bool allow_
 template <SlotStore S>
 UpdateReply UpdateSession<S>::judge_signature(wire::SignedHeader header, const BootDecision& decision) const {
   const std::uint32_t counter = rollback_counter(store_, decision);
-  const wire::UpdateOutcome outcome = vouched_for(store_, header, counter);
+  const wire::UpdateOutcome outcome = check_signature(store_, header, counter);
   return {outcome, outcome == wire::UpdateOutcome::rolled_back ? counter : 0};
 }
 
@@ -93,7 +93,7 @@ UpdateReply UpdateSession<S>::begin(const wire::BeginUpdate& request) {
   if (std::equal(sent.begin(), sent.begin() + request.header_bytes, store_.slot(slot_).begin()) &&
       !erase_interrupted(store_.records(), slot_)) {
     held_ = held_code(store_.slot(slot_), header->code_bytes);
-  } else if (!make_room(request)) {
+  } else if (!prepare_slot(request)) {
     return refuse(flash_failed, 0);
   }
   image_ = header;
@@ -101,7 +101,7 @@ UpdateReply UpdateSession<S>::begin(const wire::BeginUpdate& request) {
 }
 
 template <SlotStore S>
-bool UpdateSession<S>::make_room(const wire::BeginUpdate& request) {
+bool UpdateSession<S>::prepare_slot(const wire::BeginUpdate& request) {
   // A sector of records whose own erase was cut off has no whole record at its beginning, which is written last.
   const bool records_sound = decode_record(store_.records().template first<kRecordBytes>()).has_value();
   if (!still_erased()) {

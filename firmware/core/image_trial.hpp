@@ -15,14 +15,14 @@ class ImageTrial {
   /// How long an image may run unconfirmed; longer if it is not at rest then.
   static constexpr Ticks kTrial = microseconds(20'000'000);
   /// From the order to enter the bootloader to the reset: time for the answer to leave.
-  static constexpr Ticks kFarewell = microseconds(50'000);
+  static constexpr Ticks kRestartDelay = microseconds(50'000);
 
   ImageTrial(B& board, Motion<B>& motion) : board_(board), motion_(motion) {}
 
   wire::UpdateOutcome enter_bootloader() {
     if (!at_rest_and_disarmed()) return wire::UpdateOutcome::not_at_rest;
     motion_.let_go();
-    farewell_ends_ = board_.now() + kFarewell;
+    restart_at_ = board_.now() + kRestartDelay;
     return wire::UpdateOutcome::done;
   }
 
@@ -43,12 +43,12 @@ class ImageTrial {
     const Ticks now = board_.now();
     if (!begun_ && board_.running_image().state == wire::ImageState::on_trial) trial_ends_ = now + kTrial;
     begun_ = true;
-    if (!at_rest_and_disarmed()) farewell_ends_.reset();
-    const bool farewell = farewell_ends_ && *farewell_ends_ <= now;
+    if (!at_rest_and_disarmed()) restart_at_.reset();
+    const bool restart_due = restart_at_ && *restart_at_ <= now;
     const bool failed = trial_ends_ && *trial_ends_ <= now;
-    if ((!farewell && !failed) || !at_rest_and_disarmed()) return;
+    if ((!restart_due && !failed) || !at_rest_and_disarmed()) return;
     motion_.let_go();
-    board_.restart(farewell);
+    board_.restart(restart_due);
   }
 
  private:
@@ -62,7 +62,7 @@ class ImageTrial {
   Motion<B>& motion_;
   bool begun_ = false;
   std::optional<Ticks> trial_ends_;
-  std::optional<Ticks> farewell_ends_;
+  std::optional<Ticks> restart_at_;
 };
 
 }  // namespace diastole::firmware

@@ -110,9 +110,9 @@ Check check_segment(const Segment& segment, const Program& program, const Settin
   if (r_wave_spacing_us <= program.r_wave_us)
     return {wire::Limit::r_wave_spacing, r_wave_spacing_us, program.r_wave_us + 1};
   if (program.trigger_delay_us > 0) {
-    const std::uint64_t taken_us =
+    const std::uint64_t occupied_us =
         std::max(program.ttl_width_us, program.r_wave_us) + first_step_us(segment, settings);
-    const std::uint64_t most_us = segment.period_us > taken_us ? segment.period_us - taken_us : 0;
+    const std::uint64_t most_us = segment.period_us > occupied_us ? segment.period_us - occupied_us : 0;
     const bool possible =
         program.trigger_delay_us >= kLeastTriggerDelay_us && most_us >= kLeastTriggerDelay_us;
     if (!possible || program.trigger_delay_us > most_us)

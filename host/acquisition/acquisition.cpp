@@ -17,10 +17,10 @@ namespace {
 
 constexpr uint64_t block_span_ns = 100'000'000;
 constexpr uint64_t gap_interval_ns = 250'000'000;
-constexpr double start_patience_s = 2;  // for RunStarted
+constexpr double start_timeout_s = 2;  // for RunStarted
 constexpr uint64_t tail_ns = 250'000'000;
-constexpr double end_patience_s = 10;  // for RunEnded, beyond the plan
-constexpr double stop_patience_s = 5;  // for RunEnded, after the journal failed
+constexpr double end_timeout_s = 10;  // for RunEnded, beyond the plan
+constexpr double stop_timeout_s = 5;  // for RunEnded, after the journal failed
 constexpr const char* journal_failed = "journal_failed";
 
 class Acquisition {
@@ -46,7 +46,7 @@ class Acquisition {
   RunOutcome run(const AcquisitionHooks& hooks) {
     hooks_ = hooks;
     const SampleGrid grid = samples_.start(setup_.sample_rate_Hz);
-    deadline_ns_ = clock_.now_ns() + static_cast<uint64_t>(start_patience_s * ns_per_s);
+    deadline_ns_ = clock_.now_ns() + static_cast<uint64_t>(start_timeout_s * ns_per_s);
     write(GridRecord{grid.first_due_ns});
     for (const std::string& warning : setup_.warnings)
       remark("warning", "instrument", warning);
@@ -173,7 +173,7 @@ class Acquisition {
     for (size_t i = 0; i < saturation_.size(); ++i) {
       const signal::SaturationWatch& watch = saturation_[i].watch;
       outcome_.counts.saturated += static_cast<uint64_t>(watch.samples());
-      if (watch.samples() == 0 || std::exchange(saturation_[i].told, true)) continue;
+      if (watch.samples() == 0 || std::exchange(saturation_[i].reported, true)) continue;
       remark(
           "warning", "saturated",
           fmt::format(
@@ -214,7 +214,7 @@ class Acquisition {
   void take(const InstrumentTime& time) {
     write(InstrumentClockRecord{time.host_ns, time.timer, time.half_round_trip_ns});
   }
-  void take(const Trouble& trouble) { remark("warning", "instrument", trouble.text); }
+  void take(const InstrumentFault& fault) { remark("warning", "instrument", fault.text); }
   void watch_gate() {
     if (!gate_) return;
     note(gate_->check(clock_.now_ns(), {outcome_.counts.triggers, stopped_by_estop_}));
@@ -266,7 +266,7 @@ class Acquisition {
               started_ = true;
               if (setup_.live != nullptr) setup_.live->run_started(e.tick);
               deadline_ns_ = clock_.now_ns() +
-                             static_cast<uint64_t>((setup_.planned_duration_s + end_patience_s) * ns_per_s);
+                             static_cast<uint64_t>((setup_.planned_duration_s + end_timeout_s) * ns_per_s);
               write(RunStartedRecord{e.tick});
             },
             [&](const wire::SegmentStarted& e) {
@@ -357,7 +357,7 @@ class Acquisition {
     if (tail_until_ns_) ended_ = true;  // the pump is at rest already
     if (ended_) return;
     controller_.stop_now();
-    deadline_ns_ = clock_.now_ns() + static_cast<uint64_t>(stop_patience_s * ns_per_s);
+    deadline_ns_ = clock_.now_ns() + static_cast<uint64_t>(stop_timeout_s * ns_per_s);
   }
   void end(std::string how) {
     if (outcome_.end.empty()) outcome_.end = std::move(how);
@@ -399,7 +399,7 @@ class Acquisition {
   StopRequest obeyed_ = StopRequest::none;
   struct ChannelSaturation {
     signal::SaturationWatch watch;
-    bool told = false;
+    bool reported = false;
   };
   std::vector<ChannelSaturation> saturation_;  ///< by channel
   std::optional<GateCheck> gate_;

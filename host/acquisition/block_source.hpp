@@ -49,28 +49,27 @@ class BlockSource final : public SampleSource {
     if (!batch.volts.empty()) {
       heard_ns_ = now_ns;
       deliver(std::move(batch), out);
-    } else if (now_ns - heard_ns_ > block_span_ns() + patience_ns && trouble_.empty()) {
-      trouble_ = fmt::format("no block came for {} ms", (now_ns - heard_ns_) / 1'000'000);
-      out.push_back(Trouble{trouble_});
+    } else if (now_ns - heard_ns_ > block_span_ns() + timeout_ns && fault_.empty()) {
+      fault_ = fmt::format("no block came for {} ms", (now_ns - heard_ns_) / 1'000'000);
+      out.push_back(InstrumentFault{fault_});
     }
     return out;
   }
   [[nodiscard]] uint64_t next_due_ns() const override { return next_look_ns_; }
   /// A block's span and a quarter of a second after `until_ns` nothing more is waited for.
   [[nodiscard]] bool complete(uint64_t until_ns) const override {
-    return next_index_ >= grid_.due_by(until_ns) ||
-           clock_.now_ns() > until_ns + block_span_ns() + patience_ns;
+    return next_index_ >= grid_.due_by(until_ns) || clock_.now_ns() > until_ns + block_span_ns() + timeout_ns;
   }
   std::vector<SourceItem> finish(uint64_t until_ns) override {
     std::vector<SourceItem> out;
     if (scanning_) instrument_.stop();
     scanning_ = false;
-    miss_until(grid_.due_by(until_ns), trouble_.empty() ? "no block came any more" : trouble_, out);
+    miss_until(grid_.due_by(until_ns), fault_.empty() ? "no block came any more" : fault_, out);
     return out;
   }
 
  private:
-  static constexpr uint64_t patience_ns = 250'000'000;          // for a block, beyond the time that it takes
+  static constexpr uint64_t timeout_ns = 250'000'000;           // for a block, beyond the time that it takes
   static constexpr uint64_t clock_interval_ns = 200'000'000;    // between looks at the instrument's clock
   static constexpr uint64_t restart_interval_ns = 500'000'000;  // between attempts to start the scan
 
@@ -93,14 +92,14 @@ class BlockSource final : public SampleSource {
     if (scanning_) instrument_.stop();
     scanning_ = false;
     next_look_ns_ = clock_.now_ns() + restart_interval_ns;
-    if (trouble_.empty()) out.push_back(Trouble{reason});
-    trouble_ = std::move(reason);
+    if (fault_.empty()) out.push_back(InstrumentFault{reason});
+    fault_ = std::move(reason);
   }
   void deliver(daq::Batch batch, std::vector<SourceItem>& out) {
     const size_t rows = batch.volts.size() / instrument_.channels();
     const uint64_t first = scan_base_ + batch.first_index;
-    miss_until(first, trouble_.empty() ? "blocks of the instrument were lost" : trouble_, out);
-    trouble_.clear();
+    miss_until(first, fault_.empty() ? "blocks of the instrument were lost" : fault_, out);
+    fault_.clear();
     Received received{first, {}, std::move(batch.volts)};
     for (size_t row = 0; row < rows; ++row)
       received.host_ns.push_back(grid_.due_ns(first + row));
@@ -124,7 +123,7 @@ class BlockSource final : public SampleSource {
   uint64_t next_look_ns_ = 0;
   uint64_t heard_ns_ = 0;  ///< of the instrument, last
   uint64_t next_clock_ns_ = 0;
-  std::string trouble_;  ///< since the last block; empty: none
+  std::string fault_;  ///< since the last block; empty: none
 };
 
 }  // namespace diastole

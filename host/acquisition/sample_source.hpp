@@ -47,12 +47,12 @@ struct InstrumentTime {
   uint32_t timer = 0;
 };
 
-/// The instrument is in trouble; which samples that costs is known later.
-struct Trouble {
+/// The instrument fails; which samples that costs is known later.
+struct InstrumentFault {
   std::string text;
 };
 
-using SourceItem = std::variant<Received, Missing, InstrumentTime, Trouble>;
+using SourceItem = std::variant<Received, Missing, InstrumentTime, InstrumentFault>;
 
 /// Sample k of a source is due at first_due_ns + k / rate_Hz.
 struct SampleGrid {

@@ -41,7 +41,7 @@ class ThreadedSource final : public SampleSource {
     thread_.request_stop();
     if (thread_.joinable()) thread_.join();
     std::vector<SourceItem> items = take();
-    append(items, std::exchange(taken_, {}));
+    append(items, std::exchange(pending_, {}));
     append(items, source_->finish(until_ns));
     return items;
   }
@@ -57,7 +57,7 @@ class ThreadedSource final : public SampleSource {
   void work(const std::stop_token& stop) {
     ask_for_real_time(instrument_priority);
     while (!stop.stop_requested()) {
-      append(taken_, source_->take());
+      append(pending_, source_->take());
       hand_over();
       clock_->sleep_until_ns(std::min(source_->next_due_ns(), clock_->now_ns() + most_sleep_ns), nullptr);
     }
@@ -66,13 +66,13 @@ class ThreadedSource final : public SampleSource {
   void hand_over() {
     const std::unique_lock lock(mutex_, std::try_to_lock);
     if (!lock) return;
-    append(ready_, std::exchange(taken_, {}));
+    append(ready_, std::exchange(pending_, {}));
     if (source_->complete(asked_until_ns_)) completed_until_ns_ = asked_until_ns_;
   }
 
   std::unique_ptr<Clock> clock_;
   std::unique_ptr<SampleSource> source_;  // of the thread while it runs
-  std::vector<SourceItem> taken_;         // likewise: not yet handed over
+  std::vector<SourceItem> pending_;       // likewise: not yet handed over
   mutable std::mutex mutex_;
   std::vector<SourceItem> ready_;
   mutable uint64_t asked_until_ns_ = 0;  ///< by complete(); the thread answers in completed_until_ns_

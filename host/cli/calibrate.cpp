@@ -40,9 +40,9 @@ ExitCode measure(const MeasurementOptions& options, const std::string& method, j
   params["channels"] = options.channels;
   params["seconds"] = options.seconds;
   params["operator"] = options.operator_name;
-  const auto patience = std::chrono::seconds(static_cast<int>(options.seconds) + 30);
+  const auto timeout = std::chrono::seconds(static_cast<int>(options.seconds) + 30);
   DaemonClient daemon = options.daemon.connect();
-  const json result = daemon.call(method, params, patience);
+  const json result = daemon.call(method, params, timeout);
   if (as_json) {
     print_json(result);
     return ExitCode::done;

@@ -55,7 +55,7 @@ struct DaemonQuestion {
   std::string method;
   std::function<void(const nlohmann::json& answer)> show;  ///< for a person
   bool gives_order = false;                                ///< then it may take the control over
-  std::chrono::seconds patience{30};
+  std::chrono::seconds timeout{30};
   /// Exit code 1 if it says no.
   std::function<bool(const nlohmann::json& answer)> positive = [](const nlohmann::json&) { return true; };
 };
@@ -75,7 +75,7 @@ inline void add_question(CommandLine& line, const DaemonQuestion& question) {
   if (question.gives_order) daemon->add_take_over_to(*command);
   line.on_run(command, [daemon, question](const CommandOutput& out) {
     DaemonClient client = daemon->connect();
-    const nlohmann::json answer = client.call(question.method, nlohmann::json::object(), question.patience);
+    const nlohmann::json answer = client.call(question.method, nlohmann::json::object(), question.timeout);
     print(out, answer, [&] { question.show(answer); });
     return question.positive(answer) ? ExitCode::done : ExitCode::negative;
   });

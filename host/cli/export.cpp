@@ -129,9 +129,9 @@ std::vector<fs::path> crated_names(const ExportOptions& options) {
       throw InputError({file.string(), "--also", "is not there", "Name a file or a folder."});
     names.push_back((file.filename().empty() ? file.parent_path() : file).filename());
   }
-  std::set<fs::path> taken;
+  std::set<fs::path> used_names;
   for (const fs::path& name : names) {
-    if (!taken.insert(name).second)
+    if (!used_names.insert(name).second)
       throw InputError({name.string(), "", "is the name of two files of the crate", "Rename one of them."});
     std::error_code missing;
     if (!options.force && fs::exists(options.crate / name, missing))

@@ -59,8 +59,8 @@ void add_self_test(CommandLine& line) {
     DaemonClient client = options->daemon.connect();
     if (isatty(STDERR_FILENO) != 0)
       fmt::print(stderr, "measuring; the clocks are compared for {:g} s ...\n", options->seconds);
-    const auto patience = std::chrono::seconds(static_cast<int>(options->seconds) + 30);
-    const json answer = client.call("rig.self_test", {{"seconds", options->seconds}}, patience);
+    const auto timeout = std::chrono::seconds(static_cast<int>(options->seconds) + 30);
+    const json answer = client.call("rig.self_test", {{"seconds", options->seconds}}, timeout);
     print(out, answer, [&] { show_checks(answer); });
     return answer.at("passed").get<bool>() ? ExitCode::done : ExitCode::negative;
   });

@@ -21,7 +21,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::chrono::seconds homing_patience{3600};
+constexpr std::chrono::seconds homing_timeout{3600};
 constexpr int halts_asked = 20;  // until the halt's fault shows in the state
 constexpr std::chrono::milliseconds halt_interval{50};
 
@@ -136,7 +136,7 @@ void add_home(CommandLine& line) {
              .method = "rig.home",
              .show = show_status,
              .gives_order = true,
-             .patience = homing_patience});
+             .timeout = homing_timeout});
 }
 
 void add_clear_fault(CommandLine& line) {
@@ -185,7 +185,7 @@ void add_jog(CommandLine& line) {
     }
     DaemonClient client = options->daemon.connect();
     const json status = client.call(
-        "rig.jog", {{"mL", options->distance_mL}, {"rate_mL_s", options->rate_mL_s}}, homing_patience);
+        "rig.jog", {{"mL", options->distance_mL}, {"rate_mL_s", options->rate_mL_s}}, homing_timeout);
     if (!out.json) {
       fmt::print("jogged    {:+.3f} mL{}\n", status.at("jogged_mL").get<double>(),
                  status.at("stopped").get<bool>() ? ", stopped on request" : "");

@@ -130,7 +130,7 @@ class ControllerClient final : public Controller {
         refuse_program(experiment, refusal->segment, *refusal);
       requests_.fail(std::string(wire::refusal_explanation(refusal->refusal)), remedy_for(refusal->refusal));
     }
-    const uint64_t end_ns = clock_.now_ns() + plan_patience_ns;
+    const uint64_t end_ns = clock_.now_ns() + plan_timeout_ns;
     while (plan_.size() < experiment.segments.size() && link_.has_line() && clock_.now_ns() < end_ns)
       link_.turn();
     return plan_;
@@ -185,8 +185,8 @@ class ControllerClient final : public Controller {
  private:
   static constexpr uint64_t ns_per_ms = 1'000'000;
   static constexpr uint64_t status_question_interval_ns = 500 * ns_per_ms;
-  static constexpr uint64_t rest_patience_ns = 5'000 * ns_per_ms;
-  static constexpr uint64_t plan_patience_ns = 1'000 * ns_per_ms;
+  static constexpr uint64_t rest_timeout_ns = 5'000 * ns_per_ms;
+  static constexpr uint64_t plan_timeout_ns = 1'000 * ns_per_ms;
 
   static bool moves(wire::State state) {
     return state == wire::State::running || state == wire::State::stopping || state == wire::State::homing ||
@@ -250,7 +250,7 @@ class ControllerClient final : public Controller {
     if (!moves(found)) return;
     found_moving_ = found;
     stop_now();
-    const uint64_t end_ns = clock_.now_ns() + rest_patience_ns;
+    const uint64_t end_ns = clock_.now_ns() + rest_timeout_ns;
     while (moves(status().state)) {
       if (clock_.now_ns() > end_ns)
         requests_.fail("moves and does not obey a stop", "Press the emergency stop.");
@@ -278,7 +278,7 @@ class ControllerClient final : public Controller {
         refuse_program(experiment, static_cast<size_t>(segment - experiment.segments.begin()), *refusal);
       };
       put(waveform_message(rises, number));
-      std::ranges::for_each(waveform_lots(rises), put);
+      std::ranges::for_each(waveform_batches(rises), put);
     }
   }
   /// Throws unless the controller has settings that agree with the rig file, and the file's limits.

@@ -36,7 +36,7 @@ class ControllerLink {
     line_ = std::move(line);
     clock_.line_opened(*line_);
     link_.open(++session_, clock_.now_ns() / ns_per_us);
-    const uint64_t end_ns = clock_.now_ns() + open_patience_ns;
+    const uint64_t end_ns = clock_.now_ns() + open_timeout_ns;
     const auto is_open = [this] { return link_.state() == wire::ReliableLink::State::open; };
     while (!is_open() && has_line() && clock_.now_ns() < end_ns)
       turn();
@@ -109,10 +109,10 @@ class ControllerLink {
   static constexpr uint64_t ns_per_us = 1'000;
   static constexpr uint64_t heartbeat_interval_ns = 50 * ns_per_ms;
   static constexpr uint64_t time_question_interval_ns = 250 * ns_per_ms;
-  static constexpr uint64_t time_answer_patience_ns = 20 * ns_per_ms;
+  static constexpr uint64_t time_answer_timeout_ns = 20 * ns_per_ms;
   static constexpr uint64_t fine_step_ns = 200 * ns_per_us;  // while an answer is awaited
-  static constexpr uint64_t open_patience_ns = 1'500 * ns_per_ms;
-  static constexpr uint64_t silence_patience_ns = 1'000 * ns_per_ms;
+  static constexpr uint64_t open_timeout_ns = 1'500 * ns_per_ms;
+  static constexpr uint64_t silence_timeout_ns = 1'000 * ns_per_ms;
 
   void receive() {
     std::array<uint8_t, 512> block{};
@@ -126,12 +126,12 @@ class ControllerLink {
     if (!greeted_) return;
     const uint64_t now_ns = clock_.now_ns();
     const uint64_t heard_ns = link_.last_heard_us() * ns_per_us;
-    if (now_ns > heard_ns + silence_patience_ns) return hooks_.broke("the controller has fallen silent");
+    if (now_ns > heard_ns + silence_timeout_ns) return hooks_.broke("the controller has fallen silent");
     if (now_ns >= next_heartbeat_ns_) {
       send(wire::Heartbeat{.lease_id = lease_id_});
       next_heartbeat_ns_ = now_ns + heartbeat_interval_ns;
     }
-    if (time_asked_ns_ != 0 && now_ns > time_asked_ns_ + time_answer_patience_ns) time_asked_ns_ = 0;
+    if (time_asked_ns_ != 0 && now_ns > time_asked_ns_ + time_answer_timeout_ns) time_asked_ns_ = 0;
     if (now_ns >= next_time_question_ns_) ask_time();
     hooks_.serviced();
   }

@@ -62,13 +62,13 @@ class Requests {
   /// Whether this is the answer that is awaited, which is then kept.
   template <class Message>
   bool take(const Message& message) {
-    bool mine = awaited_ == message.request_id;
+    bool matches = awaited_ == message.request_id;
     if constexpr (std::is_same_v<Message, wire::Nak>) {
       // A request that cannot be decoded is refused without its number.
-      mine = mine || (awaited_ && message.refusal == wire::Refusal::malformed && message.request_id == 0 &&
-                      message.request_type == awaited_type_);
+      matches = matches || (awaited_ && message.refusal == wire::Refusal::malformed &&
+                            message.request_id == 0 && message.request_type == awaited_type_);
     }
-    if (!mine) return false;
+    if (!matches) return false;
     awaited_.reset();
     answer_ = message;
     return true;
@@ -87,7 +87,7 @@ class Requests {
   }
 
  private:
-  static constexpr uint64_t answer_patience_ns = 1'000'000'000;
+  static constexpr uint64_t answer_timeout_ns = 1'000'000'000;
 
   template <class Message>
   Answer answer_to(const Message& message) {
@@ -102,7 +102,7 @@ class Requests {
       fail("is not connected", "Check cable and power; the daemon reconnects by itself.");
   }
   void await() {
-    const uint64_t end_ns = clock_.now_ns() + answer_patience_ns;
+    const uint64_t end_ns = clock_.now_ns() + answer_timeout_ns;
     while (awaited_ && link_.has_line() && clock_.now_ns() < end_ns)
       link_.turn();
     if (!link_.has_line()) fail("the line broke", "Check the cable; the daemon reconnects by itself.");

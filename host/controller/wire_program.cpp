@@ -106,7 +106,7 @@ wire::UploadWaveform waveform_message(const std::vector<int16_t>& rises, size_t 
   return {0, static_cast<uint8_t>(number), static_cast<uint16_t>(rises.size()), crc.value()};
 }
 
-std::vector<wire::WaveformPoints> waveform_lots(const std::vector<int16_t>& rises) {
+std::vector<wire::WaveformPoints> waveform_batches(const std::vector<int16_t>& rises) {
   std::vector<wire::WaveformPoints> lots;
   for (size_t first = 0; first < rises.size(); first += wire::WaveformPoints::kMaxCount) {
     wire::WaveformPoints& lot = lots.emplace_back();

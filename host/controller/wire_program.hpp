@@ -32,7 +32,7 @@ double reported_rate_Hz(const Experiment& experiment, const ControllerConfig& co
 wire::AddSegment segment_message(const Experiment& experiment, size_t index);
 /// An uploaded waveform begins with this message, and its points follow in lots.
 wire::UploadWaveform waveform_message(const std::vector<int16_t>& rises, size_t number);
-std::vector<wire::WaveformPoints> waveform_lots(const std::vector<int16_t>& rises);
+std::vector<wire::WaveformPoints> waveform_batches(const std::vector<int16_t>& rises);
 wire::Arm arm_message(const Experiment& experiment, const RigConfig& rig);
 
 }  // namespace diastole

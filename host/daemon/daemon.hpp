@@ -13,7 +13,7 @@ struct DaemonOptions {
   std::optional<std::string> daq_address;
   std::optional<std::string> socket;
   std::optional<std::string> journal_dir;
-  std::optional<std::string> console;  ///< [ADDRESS:]PORT of the web console (host/web/door.hpp)
+  std::optional<std::string> console;  ///< [ADDRESS:]PORT of the web console (host/web/access_policy.hpp)
   std::string producer;                ///< "diastole 0.1.0"
 };
 

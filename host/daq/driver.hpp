@@ -22,15 +22,15 @@ namespace diastole::daq {
 struct OpenOptions {
   /// Where the instrument is, instead of what the rig file says ("127.0.0.1:1502").
   std::optional<std::string> address = {};
-  /// Patience for one answer, at least, on the wall's clock; a conducted simulation is patient with a loaded machine.
+  /// Timeout for one answer, at least, on the wall's clock; a conducted simulation is patient with a loaded machine.
   int least_timeout_ms = 0;
-  /// The time by which an instrument that is not there samples, and by which patience counts that a simulation has
+  /// The time by which an instrument that is not there samples, and by which the timeout counts that a simulation has
   /// ended by closing the connection; empty: CLOCK_MONOTONIC.
   std::function<uint64_t()> now_ns = {};
   OpenHid open_hid = {};  ///< instead of open_hidapi
 };
 
-/// Patience that a rig file may give an instrument for one answer: the samples that come due meanwhile are lost,
+/// The timeout that a rig file may give an instrument for one answer: the samples that come due meanwhile are lost,
 /// and the end of a run waits for it.
 inline constexpr int most_timeout_ms = 1000;
 

@@ -60,7 +60,7 @@ class TcpLine final : public ModbusLine {
   TcpLine(TcpAddress address, int unit, const OpenOptions& options)
       : at_(std::move(address)),
         unit_(unit),
-        wall_patience_ms_(std::max(at_.timeout_ms, options.least_timeout_ms)),
+        wall_timeout_ms_(std::max(at_.timeout_ms, options.least_timeout_ms)),
         now_ns_(options.now_ns ? options.now_ns : [] { return uint64_t{0}; }) {
     find();
   }
@@ -75,17 +75,17 @@ class TcpLine final : public ModbusLine {
 
   std::string ask(bool input_function, int first, std::span<uint16_t> out) override {
     const uint64_t asked_ns = now_ns_();
-    const Moment give_up = end_of_patience();
+    const Moment give_up = deadline();
     if (context_ == nullptr) {
       if (std::string fault = connect(give_up); !fault.empty()) return fault;
     }
-    be_patient_until(give_up);
+    set_response_timeout(give_up);
     const auto read = input_function ? modbus_read_input_registers : modbus_read_registers;
     const int count = static_cast<int>(out.size());
     if (read(context_.get(), first, count, out.data()) == count) return {};
     const int error = errno;
     std::string reason = modbus_strerror(error);
-    if (error == ETIMEDOUT) reason = no_answer_within(wall_patience_ms_);
+    if (error == ETIMEDOUT) reason = no_answer_within(wall_timeout_ms_);
     if (simulated_wait_ms(asked_ns) >= at_.timeout_ms) reason = no_answer_within(at_.timeout_ms);
     context_.reset();
     return reason;
@@ -94,8 +94,8 @@ class TcpLine final : public ModbusLine {
  private:
   using Moment = std::chrono::steady_clock::time_point;
 
-  [[nodiscard]] Moment end_of_patience() const {
-    return std::chrono::steady_clock::now() + std::chrono::milliseconds(wall_patience_ms_);
+  [[nodiscard]] Moment deadline() const {
+    return std::chrono::steady_clock::now() + std::chrono::milliseconds(wall_timeout_ms_);
   }
 
   static std::string no_answer_within(int ms) { return fmt::format("no answer within {} ms", ms); }
@@ -111,14 +111,14 @@ class TcpLine final : public ModbusLine {
     std::string fault;
     for (const std::string& address : addresses_of(at_.host)) {
       address_ = address;
-      fault = connect(end_of_patience());
+      fault = connect(deadline());
       if (fault.empty()) return;
     }
     throw HardwareError(describe(), fault, remedy());
   }
 
-  /// The patience for whatever is asked next: until `give_up`, and a millisecond at least.
-  void be_patient_until(Moment give_up) {
+  /// The timeout for whatever is asked next: until `give_up`, and a millisecond at least.
+  void set_response_timeout(Moment give_up) {
     const auto left =
         std::chrono::duration_cast<std::chrono::microseconds>(give_up - std::chrono::steady_clock::now());
     const auto left_us = static_cast<uint32_t>(std::max<int64_t>(left.count(), 1000));
@@ -131,7 +131,7 @@ class TcpLine final : public ModbusLine {
     if (context_ == nullptr) return "is not an address";
     modbus_set_byte_timeout(context_.get(), 0, 0);  // the response's time-out is for all of its bytes
     modbus_set_slave(context_.get(), unit_);
-    be_patient_until(give_up);
+    set_response_timeout(give_up);
     if (modbus_connect(context_.get()) == 0) return {};
     const std::string reason = modbus_strerror(errno);
     context_.reset();
@@ -140,7 +140,7 @@ class TcpLine final : public ModbusLine {
 
   TcpAddress at_;
   int unit_;
-  int wall_patience_ms_;
+  int wall_timeout_ms_;
   std::function<uint64_t()> now_ns_;  // simulated; stands still in real time
   std::string address_;
   ModbusContext context_;

@@ -21,9 +21,9 @@ class UpdateLink {
       : clock_(clock), line_(line), session_(static_cast<uint16_t>(std::random_device{}())) {}
 
   /// Begins a new session; false if nobody answers in time. What was asked before is forgotten.
-  bool open(uint64_t patience_ns) {
+  bool open(uint64_t timeout_ns) {
     link_.open(++session_, clock_.now_ns() / ns_per_us);
-    const uint64_t end_ns = clock_.now_ns() + patience_ns;
+    const uint64_t end_ns = clock_.now_ns() + timeout_ns;
     while (link_.state() == wire::ReliableLink::State::opening && alive() && clock_.now_ns() < end_ns)
       turn();
     return is_open();
@@ -34,14 +34,14 @@ class UpdateLink {
   /// Sends a request and returns its answer; nothing if the line does not take it in time, the answer does not come
   /// in time, or the session ends.
   template <class Answer, class Request>
-  std::optional<Answer> ask(Request request, uint64_t patience_ns) {
+  std::optional<Answer> ask(Request request, uint64_t timeout_ns) {
     request.request_id = ++last_request_;
     std::array<uint8_t, wire::kMaxPayloadBytes> memory{};
     const auto bytes = wire::encode(request, memory);
-    for (const uint64_t end_ns = clock_.now_ns() + line_patience_ns; !link_.send(Request::kType, bytes);
+    for (const uint64_t end_ns = clock_.now_ns() + line_timeout_ns; !link_.send(Request::kType, bytes);
          turn())
       if (!is_open() || clock_.now_ns() >= end_ns) return {};
-    for (const uint64_t end_ns = clock_.now_ns() + patience_ns;; turn()) {
+    for (const uint64_t end_ns = clock_.now_ns() + timeout_ns;; turn()) {
       const auto* answer = std::get_if<Answer>(&answer_);
       if (answer != nullptr && answer->request_id == last_request_) return *answer;
       if (!is_open() || clock_.now_ns() >= end_ns) return {};
@@ -74,7 +74,7 @@ class UpdateLink {
   using Answers = std::variant<wire::Hello, wire::ImageReport, wire::UpdateAnswer>;
   static constexpr uint64_t ns_per_us = 1'000;
   static constexpr uint64_t step_ns = 1'000'000;
-  static constexpr uint64_t line_patience_ns = 5'000'000'000;
+  static constexpr uint64_t line_timeout_ns = 5'000'000'000;
 
   void turn() {
     for (auto bytes = link_.transmit(clock_.now_ns() / ns_per_us); !bytes.empty();

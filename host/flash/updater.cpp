@@ -12,11 +12,11 @@ namespace diastole {
 namespace {
 
 constexpr uint64_t ms = 1'000'000;  // ns
-constexpr uint64_t answer_patience = 1'500 * ms;
-constexpr uint64_t erase_patience = 8'000 * ms;
-constexpr uint64_t write_patience = 8'000 * ms;
-constexpr uint64_t reset_patience = 4'000 * ms;
-constexpr uint64_t rescue_patience = 15'000 * ms;
+constexpr uint64_t answer_timeout = 1'500 * ms;
+constexpr uint64_t erase_timeout = 8'000 * ms;
+constexpr uint64_t write_timeout = 8'000 * ms;
+constexpr uint64_t reset_timeout = 4'000 * ms;
+constexpr uint64_t rescue_timeout = 15'000 * ms;
 constexpr uint64_t while_it_resets = 60 * ms;
 /// Bootloaders of before take a bare header.
 constexpr wire::FirmwareVersion signing_since{1, 1, 0};
@@ -44,7 +44,7 @@ class Updater {
       : link_(clock, line), port_(std::move(port)), file_(file), options_(options) {}
 
   UpdateResult flash() {
-    const Greeting found = find_controller();
+    const FoundController found = find_controller();
     if (!wanted(found)) return result_;
     if (options_.dry_run) {
       result_.end = UpdateEnd::dry_run;
@@ -64,18 +64,18 @@ class Updater {
   }
 
  private:
-  struct Greeting {
+  struct FoundController {
     wire::Hello hello;
     bool bootloader = false;
   };
 
-  Greeting find_controller() {
-    if (const auto found = greet(answer_patience)) return *found;
+  FoundController find_controller() {
+    if (const auto found = greet(answer_timeout)) return *found;
     options_.say(
         fmt::format("{} does not answer. Reset the controller now, or switch it off and on: for {} s its "
                     "bootloader is called.",
-                    port_, rescue_patience / (1'000 * ms)));
-    for (uint64_t waited = 0; waited < rescue_patience; waited += 500 * ms) {
+                    port_, rescue_timeout / (1'000 * ms)));
+    for (uint64_t waited = 0; waited < rescue_timeout; waited += 500 * ms) {
       link_.flood_stay(400 * ms);
       if (const auto found = greet(100 * ms)) return *found;
       if (options_.stop_asked()) break;
@@ -84,14 +84,14 @@ class Updater {
          "Check cable, power and --baud; a board without this bootloader is flashed once by SWD "
          "(docs/firmware.md).");
   }
-  std::optional<Greeting> greet(uint64_t patience_ns) {
-    if (!link_.open(patience_ns)) return {};
+  std::optional<FoundController> greet(uint64_t timeout_ns) {
+    if (!link_.open(timeout_ns)) return {};
     const auto hello =
-        link_.ask<wire::Hello>(wire::HelloRequest{.schema_hash = wire::kSchemaHash}, answer_patience);
+        link_.ask<wire::Hello>(wire::HelloRequest{.schema_hash = wire::kSchemaHash}, answer_timeout);
     if (!hello) return {};
-    return Greeting{*hello, hello->schema_hash == wire::kBootloaderSchema};
+    return FoundController{*hello, hello->schema_hash == wire::kBootloaderSchema};
   }
-  bool wanted(const Greeting& found) {
+  bool wanted(const FoundController& found) {
     if (file_.board_id != found.hello.board_id) {
       throw InputError({file_.file, "board id",
                         fmt::format("is for board {}, and the controller is board {}", file_.board_id,
@@ -122,10 +122,10 @@ class Updater {
     return true;
   }
   wire::Hello enter_bootloader() {
-    const auto answer = answer_to(wire::EnterBootloader{}, answer_patience, "enter its bootloader");
+    const auto answer = answer_to(wire::EnterBootloader{}, answer_timeout, "enter its bootloader");
     if (answer.outcome != wire::UpdateOutcome::done)
       fail("refused: " + explanation(answer), std::string(wire::update_outcome_remedy(answer.outcome)));
-    for (uint64_t waited = 0; waited < reset_patience; waited += 100 * ms) {
+    for (uint64_t waited = 0; waited < reset_timeout; waited += 100 * ms) {
       link_.pause(while_it_resets);
       const auto found = greet(100 * ms);
       if (found && found->bootloader) return found->hello;
@@ -148,7 +148,7 @@ class Updater {
          "Take the image that was built for this board."});
   }
   std::optional<wire::ImageReport> report_of(wire::ImageSlot slot) {
-    return link_.ask<wire::ImageReport>(wire::ImageQuery{.slot = slot}, answer_patience);
+    return link_.ask<wire::ImageReport>(wire::ImageQuery{.slot = slot}, answer_timeout);
   }
   /// False if it was stopped.
   bool upload(const SlotImage& image) {
@@ -161,7 +161,7 @@ class Updater {
       outcome = send_image(image, stopped);
     }
     if (outcome != wire::UpdateOutcome::done) refused({.outcome = outcome, .value = result_.held_bytes});
-    const auto started = answer_to(wire::StartImage{}, answer_patience, "start the image");
+    const auto started = answer_to(wire::StartImage{}, answer_timeout, "start the image");
     if (!stopped && started.outcome != wire::UpdateOutcome::done) refused(started);
     return !stopped;
   }
@@ -175,7 +175,7 @@ class Updater {
       begin.header_bytes = wire::kSignedHeaderBytes;
       std::ranges::copy(wire::encode(image.signature), begin.header.begin() + wire::kImageSignatureAt);
     }
-    const auto begun = answer_to(begin, erase_patience, "make room for the image");
+    const auto begun = answer_to(begin, erase_timeout, "make room for the image");
     if (begun.outcome == flash_failed) return flash_failed;
     if (begun.outcome != done) refused(begun);
     if (begun.held_bytes > 0) options_.say(fmt::format("{} bytes are there already", begun.held_bytes));
@@ -192,20 +192,20 @@ class Updater {
       data.count = static_cast<uint8_t>(std::min<size_t>(wire::UpdateData::kMaxCount, total - data.offset));
       std::copy_n(image.code.begin() + data.offset, data.count, data.data.begin());
       result_.sent_bytes += data.count;
-      const auto answer = answer_to(data, write_patience, "take the image");
+      const auto answer = answer_to(data, write_timeout, "take the image");
       if (answer.outcome == flash_failed) return flash_failed;
       if (answer.outcome != done) refused(answer);
       result_.held_bytes = answer.held_bytes;
       options_.progress(result_.held_bytes, total);
     }
-    const auto finished = answer_to(wire::FinishUpdate{}, answer_patience, "verify the image");
+    const auto finished = answer_to(wire::FinishUpdate{}, answer_timeout, "verify the image");
     if (finished.outcome == not_verified) return not_verified;
     if (finished.outcome != done) refused(finished);
     return done;
   }
   void confirm() {
-    std::optional<Greeting> found;
-    for (uint64_t waited = 0; waited < reset_patience && !found; waited += 100 * ms) {
+    std::optional<FoundController> found;
+    for (uint64_t waited = 0; waited < reset_timeout && !found; waited += 100 * ms) {
       link_.pause(while_it_resets);
       found = greet(100 * ms);
     }
@@ -220,11 +220,11 @@ class Updater {
            remedy);
     }
     const auto confirmed =
-        answer_to(wire::ConfirmImage{.build_id = file_.build_id}, answer_patience, "confirm the image");
+        answer_to(wire::ConfirmImage{.build_id = file_.build_id}, answer_timeout, "confirm the image");
     if (confirmed.outcome != wire::UpdateOutcome::done) refused(confirmed);
   }
-  wire::UpdateAnswer answer_to(const auto& request, uint64_t patience_ns, const char* action) {
-    if (const auto answer = link_.ask<wire::UpdateAnswer>(request, patience_ns)) return *answer;
+  wire::UpdateAnswer answer_to(const auto& request, uint64_t timeout_ns, const char* action) {
+    if (const auto answer = link_.ask<wire::UpdateAnswer>(request, timeout_ns)) return *answer;
     fail(fmt::format("fell silent when it was to {}", action),
          "Check cable and power and give the same command again: what was sent stays, and it goes on from "
          "there.");

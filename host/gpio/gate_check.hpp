@@ -49,7 +49,7 @@ class GateCheck {
     if (now_ns >= second_since_ns_ + ns_per_s) begin_second(out, now_ns);
     if (inputs_.counts_pulses() && pulses_ != controller.triggers) {
       if (!counts_differ_since_ns_) counts_differ_since_ns_ = now_ns;
-      if (!counts_reported_ && now_ns - *counts_differ_since_ns_ > report_patience_ns) {
+      if (!counts_reported_ && now_ns - *counts_differ_since_ns_ > report_timeout_ns) {
         counts_reported_ = true;
         out.push_back({"error", "gate_count",
                        fmt::format("the gating line showed {} pulses, the controller reported {} triggers{}",
@@ -71,7 +71,7 @@ class GateCheck {
   /// Whether the controller still has time to report a pressed emergency stop: the run's end waits for that, half a
   /// second at most.
   [[nodiscard]] bool awaits_estop(uint64_t now_ns, const ControllerWitness& controller) const {
-    return estop_since_ns_ && !controller.stopped_by_estop && now_ns <= *estop_since_ns_ + report_patience_ns;
+    return estop_since_ns_ && !controller.stopped_by_estop && now_ns <= *estop_since_ns_ + report_timeout_ns;
   }
   /// At the end; `triggers_raised` is the controller's own count, if it reported one.
   [[nodiscard]] std::vector<GateRemark> close(uint64_t now_ns, const ControllerWitness& controller,
@@ -101,7 +101,7 @@ class GateCheck {
   }
 
  private:
-  static constexpr uint64_t report_patience_ns =
+  static constexpr uint64_t report_timeout_ns =
       500'000'000;  // for the controller's report of a trigger or a fault
   static constexpr uint64_t ns_per_s = 1'000'000'000;
   static constexpr uint64_t bounce_ns =

@@ -58,10 +58,10 @@ void copy_bytes(const fs::path& from, const fs::path& to) {
     if (held < 0 && errno == EINTR) continue;
     must(held > 0, "cannot be read", from);
     for (ssize_t done = 0; done < held;) {
-      const ssize_t taken = ::write(target.get(), buffer.data() + done, static_cast<size_t>(held - done));
-      if (taken < 0 && errno == EINTR) continue;
-      must(taken > 0, "cannot be written", to);
-      done += taken;
+      const ssize_t written = ::write(target.get(), buffer.data() + done, static_cast<size_t>(held - done));
+      if (written < 0 && errno == EINTR) continue;
+      must(written > 0, "cannot be written", to);
+      done += written;
     }
   }
   must(::fsync(target.get()) == 0, "cannot be brought to the disk", to);

@@ -7,7 +7,7 @@
 #include <boost/uuid/uuid_io.hpp>
 #include <chrono>
 
-#include "host/acquisition/disk_room.hpp"
+#include "host/acquisition/disk_space.hpp"
 #include "host/config/experiment.hpp"
 #include "host/controller/settings_values.hpp"
 #include "host/journal/journal_store.hpp"
@@ -25,7 +25,7 @@ namespace {
 class LongWork {
  public:
   explicit LongWork(ServiceManager* manager) : manager_(manager) {
-    if (manager_ != nullptr) manager_->allow(long_work_patience);
+    if (manager_ != nullptr) manager_->allow(long_work_timeout);
   }
   ~LongWork() {
     if (manager_ != nullptr) manager_->allow_no_more();
@@ -34,7 +34,7 @@ class LongWork {
   LongWork& operator=(const LongWork&) = delete;
 
  private:
-  static constexpr std::chrono::minutes long_work_patience{10};
+  static constexpr std::chrono::minutes long_work_timeout{10};
   ServiceManager* manager_;
 };
 
@@ -196,7 +196,7 @@ void RigService::check_disk(const RunPlan& plan, const daq::RatePlan& rate, int6
   RunSize size{plan.planned_s, rate.rate_Hz, controller_->position_rate_Hz(), rig_.daq.channels.size(),
                static_cast<uint64_t>(most_cycles)};
   if (!rate.warning.empty()) size.gaps_Hz = rate.rate_Hz / 2;
-  check_room(rig_.daemon.journal_dir, size);
+  check_disk_space(rig_.daemon.journal_dir, size);
 }
 
 void RigService::tidy_journals() {

@@ -31,7 +31,7 @@ bool asks_for(const CalibrationOrder& order, const std::string& channel) {
 constexpr uint64_t idle_step_ns = 20'000'000;
 constexpr std::chrono::milliseconds waiting_step{50};  // while time stands still
 constexpr uint64_t reconnect_interval_ns = 1'000'000'000;
-constexpr uint64_t homing_patience_ns = 1'800'000'000'000;
+constexpr uint64_t homing_timeout_ns = 1'800'000'000'000;
 constexpr uint64_t homing_step_ns = 10'000'000;
 constexpr int conducted_timeout_ms = 5000;  // wall time; virtual time stands still meanwhile
 
@@ -271,14 +271,14 @@ void RigService::black_box(Done done) {
   const auto read = [this] {
     return BlackBox{controller_->black_box(), static_cast<double>(controller_->hello().tick_rate_Hz)};
   };
-  ask(black_box_askers_, read, std::move(done));
+  ask(black_box_requests_, read, std::move(done));
 }
 
 void RigService::status(Done done) {
   const std::string activity = queue_.activity();
   if (activity.empty())
     return ask(
-        status_askers_, [this] { return do_status(); }, std::move(done));
+        status_requests_, [this] { return do_status(); }, std::move(done));
   std::unique_lock lock(mutex_);
   RigStatus last = last_status_;
   lock.unlock();
@@ -287,20 +287,20 @@ void RigService::status(Done done) {
   done(nullptr, last);
 }
 
-void RigService::ask(std::vector<Done>& askers, std::function<RigAnswer()> answer, Done done) {
+void RigService::ask(std::vector<Done>& waiting, std::function<RigAnswer()> answer, Done done) {
   {
     const std::lock_guard lock(mutex_);
-    askers.push_back(std::move(done));
-    if (askers.size() > 1) return;
+    waiting.push_back(std::move(done));
+    if (waiting.size() > 1) return;
   }
-  const auto answer_all = [this, &askers](const std::exception_ptr& error, const RigAnswer& what) {
+  const auto answer_all = [this, &waiting](const std::exception_ptr& error, const RigAnswer& what) {
     std::vector<Done> all;
     {
       const std::lock_guard lock(mutex_);
-      all.swap(askers);
+      all.swap(waiting);
     }
-    for (const Done& asker : all)
-      asker(error, what);
+    for (const Done& reply : all)
+      reply(error, what);
   };
   try {
     queue_.give({"", std::move(answer), answer_all});
@@ -315,7 +315,7 @@ void RigService::note(const RunRemark& what) {
 }
 
 bool RigService::await_end_of(wire::State moving) {
-  const uint64_t end_ns = clock_->now_ns() + homing_patience_ns;
+  const uint64_t end_ns = clock_->now_ns() + homing_timeout_ns;
   StopRequest obeyed = StopRequest::none;
   for (wire::Status status = controller_->status(); status.state == moving; status = controller_->status()) {
     (void)remember(status);

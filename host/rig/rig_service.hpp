@@ -108,7 +108,7 @@ class RigService {
   /// Runs `work` on a thread of no priority; the line to the controller stays alive meanwhile.
   void beside_the_line(const std::function<void()>& work);
   /// One order answers all who ask until it is carried out.
-  void ask(std::vector<Done>& askers, std::function<RigAnswer()> answer, Done done);
+  void ask(std::vector<Done>& waiting, std::function<RigAnswer()> answer, Done done);
   void carry_out(RigOrder order);
   void reconnect_if_due();
   /// Connects, and reports what was found: a motion that nobody ordered and that was stopped, a latched fault.
@@ -154,7 +154,7 @@ class RigService {
   LiveTrace live_;
 
   mutable InheritingMutex mutex_;  // of what follows
-  std::vector<Done> status_askers_, black_box_askers_;
+  std::vector<Done> status_requests_, black_box_requests_;
   RigStatus last_status_;
   std::optional<std::string> notice_;  ///< as in status
   KeptJournals journals_;

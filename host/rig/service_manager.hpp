@@ -42,9 +42,9 @@ class ServiceManager {
     next_beat_us_ = now + interval_.count() / beats_an_interval;
     notify("WATCHDOG=1");
   }
-  /// Work that does not sleep follows, and may take `patience` (writing a long run's file).
-  void allow(std::chrono::microseconds patience) {
-    if (interval_.count() > 0) notify(fmt::format("WATCHDOG_USEC={}", std::max(patience, interval_).count()));
+  /// Work that does not sleep follows, and may take `timeout` (writing a long run's file).
+  void allow(std::chrono::microseconds timeout) {
+    if (interval_.count() > 0) notify(fmt::format("WATCHDOG_USEC={}", std::max(timeout, interval_).count()));
   }
   /// Back to the usual interval.
   void allow_no_more() {

@@ -26,9 +26,9 @@ class DaemonClient {
   }
 
   /// One request, one answer. Throws InputError or HardwareError as the daemon raised it, HardwareError if
-  /// the daemon is gone, silent for longer than `patience`, or refuses.
+  /// the daemon is gone, silent for longer than `timeout`, or refuses.
   nlohmann::json call(const std::string& method, const nlohmann::json& params = nlohmann::json::object(),
-                      std::chrono::seconds patience = std::chrono::seconds(30)) {
+                      std::chrono::seconds timeout = std::chrono::seconds(30)) {
     const int64_t id = next_id_++;
     const std::string line = rpc::request_line(id, method, params);
     for (size_t sent = 0; sent < line.size();) {
@@ -38,7 +38,7 @@ class DaemonClient {
       sent += static_cast<size_t>(count);
     }
     try {
-      return rpc::parse_answer(read_line(patience), id);
+      return rpc::parse_answer(read_line(timeout), id);
     } catch (const rpc::Error& error) {
       throw HardwareError("daemon at " + path_, error.what(),
                           "`diastole status` says what the rig is doing.");
@@ -46,8 +46,8 @@ class DaemonClient {
   }
 
  private:
-  std::string read_line(std::chrono::seconds patience) {
-    const auto end = std::chrono::steady_clock::now() + patience;
+  std::string read_line(std::chrono::seconds timeout) {
+    const auto end = std::chrono::steady_clock::now() + timeout;
     std::array<char, 65536> block{};
     for (size_t newline = inbox_.find('\n');; newline = inbox_.find('\n')) {
       if (newline != std::string::npos) {
@@ -61,7 +61,7 @@ class DaemonClient {
       const int ready = left.count() > 0 ? ::poll(&state, 1, static_cast<int>(left.count())) : 0;
       if (ready < 0 && errno == EINTR) continue;
       if (ready == 0) {
-        throw HardwareError("daemon at " + path_, fmt::format("has not answered for {} s", patience.count()),
+        throw HardwareError("daemon at " + path_, fmt::format("has not answered for {} s", timeout.count()),
                             "See its log; restart it if it hangs.");
       }
       const ssize_t count = ::read(socket_.get(), block.data(), block.size());

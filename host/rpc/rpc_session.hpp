@@ -1,7 +1,7 @@
 #pragma once
-// One client of the daemon, whichever door it came in by: the unix socket (server.cpp) or the web console
+// One client of the daemon, whichever way it came: the unix socket (server.cpp) or the web console
 // (host/web). Here stand the rules that hold for all: who may give orders, the one control lease, how many requests
-// a second are taken and how many may wait for the rig. A door only carries messages to and fro.
+// a second are taken and how many may wait for the rig. A connection only carries messages to and fro.
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -68,7 +68,7 @@ struct SessionBounds {
   static constexpr int socket_requests = 50;   ///< in a window; beyond it reading pauses until the next
   static constexpr int console_requests = 10;  ///< likewise; a page asks for a quarter of that
   static constexpr std::chrono::milliseconds window{100};
-  static constexpr std::chrono::seconds write_patience{10};  ///< for a client that does not read
+  static constexpr std::chrono::seconds write_timeout{10};  ///< for a client that does not read
 };
 
 class RpcSession : public std::enable_shared_from_this<RpcSession> {

@@ -83,9 +83,10 @@ json follow_to_end(DaemonClient& daemon, const SessionOptions& options) {
     if (ready && progress.schedule && !progress.schedule->prompt.empty()) {
       daemon.call("run.continue", {{"slice", progress.schedule->slice}});
     }
-    const bool all_told = state.at("remarks").empty();
-    if (all_told && (state.at("state") == "done" || state.at("state") == "failed")) return state.at("result");
-    if (!all_told) continue;
+    const bool all_reported = state.at("remarks").empty();
+    if (all_reported && (state.at("state") == "done" || state.at("state") == "failed"))
+      return state.at("result");
+    if (!all_reported) continue;
     std::this_thread::sleep_for(std::chrono::milliseconds(options.poll_ms));
   }
 }

@@ -25,7 +25,7 @@ using boost::system::error_code;
 using std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-bool somebody_listens(const std::string& socket) {
+bool is_listening(const std::string& socket) {
   try {
     (void)connect_unix_socket(socket);
     return true;
@@ -44,7 +44,7 @@ using Connections = std::map<uint64_t, std::shared_ptr<Connection>>;
 class Connection : public RpcSession {
  public:
   /// For the rest of a line that was begun.
-  static constexpr std::chrono::seconds line_patience{10};
+  static constexpr std::chrono::seconds line_timeout{10};
 
   /// Removes itself from `all` when it closes.
   Connection(std::shared_ptr<RpcState> rpc_state, std::shared_ptr<Connections> all,
@@ -62,10 +62,10 @@ class Connection : public RpcSession {
   }
   /// Drops the connection if a half line or an unread answer has waited too long.
   void check(Time now) {
-    if (line_begun_ && now - *line_begun_ > line_patience) {
-      drop(fmt::format("did not end its line within {} s", line_patience.count()));
-    } else if (write_begun_ && now - *write_begun_ > SessionBounds::write_patience) {
-      drop(fmt::format("has not read for {} s", SessionBounds::write_patience.count()));
+    if (line_begun_ && now - *line_begun_ > line_timeout) {
+      drop(fmt::format("did not end its line within {} s", line_timeout.count()));
+    } else if (write_begun_ && now - *write_begun_ > SessionBounds::write_timeout) {
+      drop(fmt::format("has not read for {} s", SessionBounds::write_timeout.count()));
     }
   }
   void close() override {
@@ -89,13 +89,13 @@ class Connection : public RpcSession {
     if (!may_take()) return false;
     const size_t newline = inbox_.find('\n', searched_);
     if (newline != std::string::npos) {
-      const std::string line = inbox_.substr(taken_, newline - taken_);
-      taken_ = searched_ = newline + 1;
+      const std::string line = inbox_.substr(consumed_, newline - consumed_);
+      consumed_ = searched_ = newline + 1;
       line_begun_.reset();
       answer(line);
       return true;
     }
-    inbox_.erase(0, std::exchange(taken_, 0));
+    inbox_.erase(0, std::exchange(consumed_, 0));
     searched_ = inbox_.size();
     if (inbox_.empty() && inbox_.capacity() > kept_inbox_bytes) inbox_.shrink_to_fit();
     if (inbox_.size() >= rpc::most_line_bytes) {
@@ -141,7 +141,7 @@ class Connection : public RpcSession {
   stream_protocol::socket socket_;
   std::array<char, 16384> block_{};
   std::string inbox_;
-  size_t taken_ = 0;     // bytes of inbox_ that are answered
+  size_t consumed_ = 0;  // bytes of inbox_ that are answered
   size_t searched_ = 0;  // bytes of inbox_ that hold no newline
   bool no_more_input_ = false;
   std::optional<Time> line_begun_;
@@ -157,7 +157,7 @@ class RpcServer::Listener : public std::enable_shared_from_this<Listener> {
             [this, rpc_state](stream_protocol::socket socket) { take(rpc_state, std::move(socket)); })),
         sweep_(rpc_state->context) {
     expect_own_place(path_);
-    if (std::filesystem::exists(path_) && somebody_listens(path_)) {
+    if (std::filesystem::exists(path_) && is_listening(path_)) {
       throw HardwareError(path_, "another daemon listens at this socket",
                           "Stop it, or choose another `socket` in [daemon].");
     }
@@ -190,13 +190,13 @@ class RpcServer::Listener : public std::enable_shared_from_this<Listener> {
 
  private:
   void take(const std::shared_ptr<RpcState>& rpc_state, stream_protocol::socket socket) {
-    make_room();
+    evict_connection();
     const auto connection = std::make_shared<Connection>(rpc_state, connections_, std::move(socket));
     connections_->emplace(connection->number(), connection);
     connection->read();
   }
 
-  void make_room() {
+  void evict_connection() {
     const auto& all = *connections_;
     if (all.size() < most_connections) return;
     const auto rank = [](const auto& entry) {

@@ -59,18 +59,19 @@ class ConductedClock final : public Clock {
     return true;
   }
 
-  void take(const conductor::Advanced& told) { now_ns_ = std::max(now_ns_, told.now_ns); }
+  void take(const conductor::Advanced& advanced) { now_ns_ = std::max(now_ns_, advanced.now_ns); }
   conductor::Advanced ask(const conductor::Advance& question) {
     conductor::Record record = conductor::encode(question);
     const int fd = socket_.get();
-    bool told = transfer_all(record.data(), record.size(),
-                             [&](std::byte* at, size_t size) { return ::send(fd, at, size, MSG_NOSIGNAL); });
-    while (told) {
-      told = transfer_all(record.data(), record.size(),
-                          [&](std::byte* at, size_t size) { return ::read(fd, at, size); });
+    bool transferred = transfer_all(record.data(), record.size(), [&](std::byte* at, size_t size) {
+      return ::send(fd, at, size, MSG_NOSIGNAL);
+    });
+    while (transferred) {
+      transferred = transfer_all(record.data(), record.size(),
+                                 [&](std::byte* at, size_t size) { return ::read(fd, at, size); });
       const conductor::Advanced answer = conductor::decode_advanced(record);
-      if (told && answer.serial_bytes_sent_total != conductor::unasked) return answer;
-      if (told) take(answer);
+      if (transferred && answer.serial_bytes_sent_total != conductor::unsolicited) return answer;
+      if (transferred) take(answer);
     }
     throw HardwareError(path_, "the simulated rig that conducts time has gone",
                         "Start the simulation again.");

@@ -47,7 +47,7 @@ class SerialPort final : public ByteLine {
     send_kept();
   }
   size_t read(std::span<uint8_t> out) override {
-    take_in();
+    receive();
     const size_t count = std::min(out.size(), arrived_.size());
     const auto end = arrived_.begin() + static_cast<std::ptrdiff_t>(count);
     std::copy(arrived_.begin(), end, out.begin());
@@ -62,9 +62,9 @@ class SerialPort final : public ByteLine {
   }
   void wait_received(uint64_t total, int most_ms) override {
     const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(most_ms);
-    take_in();
+    receive();
     while (received_total_ < total && !lost_ && wait_for(POLLIN, left_ms(end)))
-      take_in();
+      receive();
   }
   [[nodiscard]] bool lost() const override { return lost_; }
   [[nodiscard]] uint64_t written_total() const override { return written_total_; }
@@ -144,7 +144,7 @@ class SerialPort final : public ByteLine {
       to_send_.erase(to_send_.begin(), to_send_.begin() + sent);
     }
   }
-  void take_in() {
+  void receive() {
     std::array<uint8_t, 4096> block{};
     while (!lost_) {
       const ssize_t got = ::read(port_.get(), block.data(), block.size());

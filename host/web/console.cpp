@@ -34,13 +34,13 @@ class ConsoleServer::Listener {
   Listener(std::shared_ptr<RpcState> rpc_state, const ConsoleAddress& address,
            const std::filesystem::path& certificate)
       : state_(std::make_shared<ServerState>(
-            ServerState{std::move(rpc_state), Door(address, machine_name()), std::nullopt})),
+            ServerState{std::move(rpc_state), AccessPolicy(address, machine_name()), std::nullopt})),
         acceptor_(std::make_shared<Acceptor<tcp>>(
             state_->rpc_state, "a browser",
-            [state = state_](tcp::socket socket) { receive_visitor(state, std::move(socket)); })) {
+            [state = state_](tcp::socket socket) { accept_connection(state, std::move(socket)); })) {
     listen_at(acceptor_->acceptor, {address.address, address.port}, "web console", "--console PORT");
     nlohmann::json& console = state_->rpc_state->console;
-    if (state_->door.reaches_beyond_this_machine()) encrypt(certificate);
+    if (state_->policy.reaches_beyond_this_machine()) encrypt(certificate);
     console["control"] = url(ConsoleRole::control);
     console["watch"] = url(ConsoleRole::watch);
   }
@@ -49,13 +49,13 @@ class ConsoleServer::Listener {
 
   void close() {
     acceptor_->close();
-    close_all(state_->visitors);
+    close_all(state_->http_connections);
     close_all(state_->consoles);
     state_->rpc_state->console = nullptr;
   }
 
   [[nodiscard]] std::string url(ConsoleRole role) const {
-    return state_->door.url(role, acceptor_->acceptor.local_endpoint().port());
+    return state_->policy.url(role, acceptor_->acceptor.local_endpoint().port());
   }
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-// The web console: the daemon's second door, for browsers.
+// The web console: the daemon's second endpoint, for browsers.
 //
 //   GET /, /console.css, ...   the page, from this program itself; anybody may have it, it holds no secret
 //   GET /role                  {"role": "control"|"watch"}, as the token says; 401 without a valid one
@@ -7,7 +7,7 @@
 //                              methods of host/rpc/server.hpp by the rules of host/rpc/rpc_session.hpp
 //
 // The token comes as "Authorization: Bearer TOKEN" or as the WebSocket's sub-protocol "token.TOKEN"; Host and Origin
-// are checked first (door.hpp). An operator signs in with a name (console.sign_in) before he gives orders.
+// are checked first (access_policy.hpp). An operator signs in with a name (console.sign_in) before he gives orders.
 //
 // From another machine all this comes encrypted (console_stream.hpp); plain HTTP is refused with a sentence.
 //
@@ -18,7 +18,7 @@
 #include <memory>
 #include <string>
 
-#include "host/web/door.hpp"
+#include "host/web/access_policy.hpp"
 
 namespace diastole {
 

@@ -16,8 +16,8 @@ namespace websocket = beast::websocket;
 using asio::ip::tcp;
 using beast::error_code;
 
-constexpr std::chrono::seconds handshake_patience{10};
-constexpr std::chrono::seconds silence_patience{10};  // a ping goes out at half of it
+constexpr std::chrono::seconds handshake_timeout{10};
+constexpr std::chrono::seconds silence_timeout{10};  // a ping goes out at half of it
 constexpr const char* subprotocol = "diastole";
 
 Peer browser_at(std::string address, ConsoleRole role) {
@@ -37,7 +37,7 @@ class ConsoleSocket : public RpcSession, public Connection {
     stream_.next_layer().tcp().expires_never();  // the WebSocket has timeouts of its own
     stream_.read_message_max(rpc::most_line_bytes);
     stream_.auto_fragment(false);
-    stream_.set_option(websocket::stream_base::timeout{handshake_patience, silence_patience, true});
+    stream_.set_option(websocket::stream_base::timeout{handshake_timeout, silence_timeout, true});
   }
 
   void begin(const http::request<http::empty_body>& upgrade) {

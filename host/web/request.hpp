@@ -9,7 +9,7 @@
 #include <span>
 #include <string_view>
 
-#include "host/web/door.hpp"
+#include "host/web/access_policy.hpp"
 
 namespace diastole::web {
 
@@ -47,6 +47,6 @@ struct Verdict {
 };
 
 /// `consoles_open`: of at most `most_consoles`.
-Verdict judge(const Door& door, const Request& request, size_t consoles_open, size_t most_consoles);
+Verdict judge(const AccessPolicy& policy, const Request& request, size_t consoles_open, size_t most_consoles);
 
 }  // namespace diastole::web

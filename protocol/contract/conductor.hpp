@@ -21,7 +21,7 @@
 // until_ns at or before the rig's present does not move time; the answer states the present.
 //
 // While the daemon waits for its instrument, time stands still, unless the answer is late or will not come. Then the
-// rig moves time on by itself, to the answer or to the end of the daemon's patience (timeout_ms of the rig file),
+// rig moves time on by itself, to the answer or to the end of the daemon's timeout (timeout_ms of the rig file),
 // and says so unasked, before it answers or closes the connection: an Advanced whose serial_bytes_sent_total is
 // 2^64 - 1.
 
@@ -46,7 +46,7 @@ struct Advanced {
   bool operator==(const Advanced&) const = default;
 };
 
-inline constexpr uint64_t unasked = UINT64_MAX;  ///< serial_bytes_sent_total of what the rig says unasked
+inline constexpr uint64_t unsolicited = UINT64_MAX;  ///< serial_bytes_sent_total of what the rig says unasked
 
 using Record = std::array<std::byte, 16>;
 

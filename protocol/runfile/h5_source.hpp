@@ -333,18 +333,18 @@ class H5Source {
   struct TextMemory {
     uint64_t left = 0;
     bool exhausted = false;
-    std::vector<void*> taken = {};
+    std::vector<void*> allocated = {};
 
     static void* take(size_t bytes, void* self) {
       auto& memory = *static_cast<TextMemory*>(self);
       memory.exhausted |= bytes > memory.left;
       if (memory.exhausted) return nullptr;
       memory.left -= bytes;
-      memory.taken.push_back(std::malloc(bytes));
-      return memory.taken.back();
+      memory.allocated.push_back(std::malloc(bytes));
+      return memory.allocated.back();
     }
     static void give(void* bytes, void* self) {
-      std::erase(static_cast<TextMemory*>(self)->taken, bytes);
+      std::erase(static_cast<TextMemory*>(self)->allocated, bytes);
       std::free(bytes);
     }
   };
@@ -355,7 +355,7 @@ class H5Source {
     const PropertyHandle transfer = buffered_for(dataset);
     H5Pset_vlen_mem_manager(transfer.get(), TextMemory::take, &memory, TextMemory::give, &memory);
     if (H5Dread(dataset.get(), memory_type, H5S_ALL, H5S_ALL, transfer.get(), target) >= 0) return true;
-    for (void* each : memory.taken)
+    for (void* each : memory.allocated)
       std::free(each);
     if (memory.exhausted)
       fail("dataset " + path, fmt::format("has texts of more than the {} bytes of its file", bytes_),

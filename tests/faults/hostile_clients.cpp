@@ -65,8 +65,8 @@ void HostileClients::attack(unsigned seed, double messages_a_second) {
         if (::send(connection.get(), text.data(), text.size(), MSG_NOSIGNAL) < 0 && errno != EAGAIN) break;
         ++sent_;
         const ssize_t got = reads ? ::recv(connection.get(), answers.data(), answers.size(), 0) : 0;
-        const std::string_view told(answers.data(), static_cast<size_t>(got > 0 ? got : 0));
-        if (told.find("\"result\":{\"own\":true") != std::string_view::npos) ++granted_;
+        const std::string_view received(answers.data(), static_cast<size_t>(got > 0 ? got : 0));
+        if (received.find("\"result\":{\"own\":true") != std::string_view::npos) ++granted_;
         std::this_thread::sleep_until(
             begun + std::chrono::duration_cast<Clock::duration>(
                         std::chrono::duration<double>(static_cast<double>(++own) / messages_a_second)));

@@ -65,10 +65,10 @@ TEST(CrashPlaces, AreNamedByTheFirmwaresSymbols) {
   bench.pass(5 * ms);
   bench.restore();
   bench.connect(1'500);
-  const json told =
+  const json answer =
       as_json(BlackBox{bench.client.black_box(), static_cast<double>(bench.client.hello().tick_rate_Hz)});
   const flow::Workplace place;
-  const AnsweringSocket socket((place / "socket").string(), told);
+  const AnsweringSocket socket((place / "socket").string(), answer);
   const auto black_box = [&](const std::vector<std::string>& more) {
     std::vector<std::string> whole{"diastole", "blackbox", "--socket", (place / "socket").string()};
     whole.insert(whole.end(), more.begin(), more.end());

@@ -191,15 +191,16 @@ TEST(Faults, DiskFull) {
     SessionOnDesk session(short_session);
     auto room = static_cast<size_t>(between(random, 3000, static_cast<double>(whole_bytes)));
     session.write = [&room](int file, const void* bytes, size_t size) {
-      const size_t taken = std::min(room, size);
-      room -= taken;
+      const size_t accepted = std::min(room, size);
+      room -= accepted;
       errno = ENOSPC;
-      return taken == 0 ? ssize_t{-1} : ::write(file, bytes, taken);
+      return accepted == 0 ? ssize_t{-1} : ::write(file, bytes, accepted);
     };
     session.run();
-    const bool told = std::any_of(session.remarks.begin(), session.remarks.end(),
-                                  [](const RunRemark& remark) { return remark.code == "journal_failed"; });
-    if (session.outcome.end != "journal_failed" || !told) return false;
+    const bool reported =
+        std::any_of(session.remarks.begin(), session.remarks.end(),
+                    [](const RunRemark& remark) { return remark.code == "journal_failed"; });
+    if (session.outcome.end != "journal_failed" || !reported) return false;
     const wire::Status status = session.client.status();
     if (status.state != wire::State::homed && status.state != wire::State::armed) return false;
     const JournalContents journal = read_journal(session.journal);

@@ -134,9 +134,9 @@ TEST(Faults, DaemonKilledInAStall) {
     most_missing = std::max(most_missing, missing);
     // The kill came after the end of the run: there is nothing more to tell than its gap.
     const bool over = run.pump.time_s.back() >= run.segments.back().end_s();
-    const bool told = !run.events.empty() && run.events.back().code == "incomplete" &&
-                      run.events.back().time_s >= run.pump.time_s.back();
-    return missing > 0 && (told || over);
+    const bool reported = !run.events.empty() && run.events.back().code == "incomplete" &&
+                          run.events.back().time_s >= run.pump.time_s.back();
+    return missing > 0 && (reported || over);
   });
   add_to_table({"kill -9 in a stall", "the instrument silent for up to 15 s", tried, survived,
                 fmt::format("every sample there or declared, up to {} of them missing", most_missing)});
@@ -152,8 +152,8 @@ double last_step_s(const std::filesystem::path& pins) {
 }
 
 /// How long after `since_s` on the rig's clock the run's link_lost was told; 0 when it has no trigger to tell by.
-double told_after_s(const std::filesystem::path& run_file, const std::filesystem::path& pins,
-                    double since_s) {
+double report_delay_s(const std::filesystem::path& run_file, const std::filesystem::path& pins,
+                      double since_s) {
   const auto run = runfile::read_run(run_file);
   if (run.trigger_s.empty()) return 0;
   const double start_s = last_edge(pins).first_ttl_s - run.trigger_s.front();
@@ -174,7 +174,7 @@ double pass_without_daemon_s(RigWithDaemon& rig, double seconds) {
 
 TEST(Faults, LinePulledOut) {
   constexpr double lease_s = 0.5, away_s = 1.5;
-  double slowest_told_s = 0, slowest_rest_s = 0, slowest_return_s = 0;
+  double slowest_report_s = 0, slowest_rest_s = 0, slowest_return_s = 0;
   const int tried = trials(3, 200);
   const int survived = survivors(tried, [&](int, std::mt19937& random) {
     const double out_s = between(random, 4, 12);
@@ -191,20 +191,20 @@ TEST(Faults, LinePulledOut) {
     const json status = rig.client().call("rig.status");
     slowest_return_s = std::max(slowest_return_s, pass_without_daemon_s(rig, 1) - back_s);
     rig.end_rig();
-    slowest_told_s =
-        std::max(slowest_told_s, told_after_s(rig.place / "gel.run.h5", rig.place / "pins.csv", out_s));
+    slowest_report_s =
+        std::max(slowest_report_s, report_delay_s(rig.place / "gel.run.h5", rig.place / "pins.csv", out_s));
     slowest_rest_s = std::max(slowest_rest_s, last_step_s(rig.place / "pins.csv") - out_s);
     const json session = ended.json();
     const bool place_known = status["fault"] == "lease_lost" || status["state"] == "homed";
     return homed.exit_code == 0 && ended.exit_code == 3 && session["end"] == "link_lost" && place_known &&
            session["samples"].get<int64_t>() + session["gaps"].get<int64_t>() == session["expected"];
   });
-  EXPECT_LE(slowest_told_s, 1);
+  EXPECT_LE(slowest_report_s, 1);
   EXPECT_LE(slowest_rest_s, lease_s) << "and not a step from then on, with the line back and a daemon at it";
   EXPECT_LE(slowest_return_s, 2);
   add_to_table({"pty hang-up", "the line pulled out of the daemon", tried, survived,
                 fmt::format("told in {:.0f} ms, at rest in {:.0f} ms and from then on, back in {:.0f} ms",
-                            1e3 * slowest_told_s, 1e3 * slowest_rest_s, 1e3 * slowest_return_s)});
+                            1e3 * slowest_report_s, 1e3 * slowest_rest_s, 1e3 * slowest_return_s)});
 }
 
 /// Waits until the run has so many samples; false if it ends before.

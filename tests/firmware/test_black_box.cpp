@@ -78,17 +78,17 @@ TEST(BlackBox, TellsOverTheWireWhatHappenedBeforeAReset) {
   options.board.identity = {1, 0xB008, ResetCause::watchdog};
   Bench bench(options);
   bench.connect();
-  std::vector<BlackBoxEntry> told;
-  for (std::uint32_t from = 0;; from = told.back().number + 1) {
+  std::vector<BlackBoxEntry> reported;
+  for (std::uint32_t from = 0;; from = reported.back().number + 1) {
     const std::size_t before = bench.heard.black_box.size();
     bench.request(wire::ReadBlackBox{0, from});
     ASSERT_TRUE(
         bench.run_until([&] { return bench.heard.black_box.size() > before; }, microseconds(500'000)));
     if (bench.heard.black_box.back().entry.number == 0) break;
-    told.push_back(bench.heard.black_box.back().entry);
+    reported.push_back(bench.heard.black_box.back().entry);
   }
   const auto has = [&](std::uint16_t boot, Noted kind, std::uint8_t detail) {
-    return std::ranges::any_of(told, [&](const BlackBoxEntry& entry) {
+    return std::ranges::any_of(reported, [&](const BlackBoxEntry& entry) {
       return entry.boot == boot && entry.kind == kind && entry.detail == detail;
     });
   };
@@ -100,7 +100,7 @@ TEST(BlackBox, TellsOverTheWireWhatHappenedBeforeAReset) {
   EXPECT_TRUE(has(1, Noted::fault, static_cast<std::uint8_t>(wire::Fault::estop)));
   EXPECT_TRUE(has(1, Noted::refusal, static_cast<std::uint8_t>(wire::Refusal::estop_pressed)));
   EXPECT_TRUE(has(2, Noted::started, static_cast<std::uint8_t>(ResetCause::watchdog)));
-  EXPECT_EQ(told.back().boot, 2);
+  EXPECT_EQ(reported.back().boot, 2);
 }
 
 TEST(BlackBox, NotesAHostThatFallsSilent) {
@@ -125,7 +125,7 @@ TEST(BlackBox, TellsTheRegistersOfACrashOnceBehindTheStart) {
   options.board.memory->crash = crash;
   Bench bench(options);
   bench.connect();
-  const auto told = [&bench] {
+  const auto reported = [&bench] {
     std::vector<BlackBoxEntry> entries;
     for (std::uint32_t from = 1;; from = entries.back().number + 1) {
       const std::size_t before = bench.heard.black_box.size();
@@ -135,7 +135,7 @@ TEST(BlackBox, TellsTheRegistersOfACrashOnceBehindTheStart) {
       entries.push_back(bench.heard.black_box.back().entry);
     }
   };
-  const auto entries = told();
+  const auto entries = reported();
   ASSERT_GT(entries.size(), wire::kCrashRegisters);
   EXPECT_EQ(entries[0].kind, Noted::started);
   for (std::size_t i = 0; i < wire::kCrashRegisters; ++i) {

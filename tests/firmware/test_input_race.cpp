@@ -38,7 +38,7 @@ class Desk {
   }
 
   template <class Message>
-  void tell(const Message& message) {
+  void send(const Message& message) {
     std::array<std::uint8_t, wire::kMaxPayloadBytes> payload{};
     ASSERT_TRUE(link.send(Message::kType, wire::encode(message, payload)));
     turn();
@@ -63,10 +63,10 @@ class Desk {
 TEST(InputRace, AnEmergencyStopWhileTheMotorIsBeingPoweredLeavesItWithout) {
   Desk desk;
   ASSERT_EQ(desk.link.state(), wire::ReliableLink::State::open);
-  desk.tell(wire::HelloRequest{1, wire::kSchemaHash, 0, 1, 0});
-  desk.tell(wire::Configure::example());
-  desk.tell(wire::Heartbeat{7});
-  desk.tell(wire::Jog{2, 7, 1'000'000, 5'000});
+  desk.send(wire::HelloRequest{1, wire::kSchemaHash, 0, 1, 0});
+  desk.send(wire::Configure::example());
+  desk.send(wire::Heartbeat{7});
+  desk.send(wire::Jog{2, 7, 1'000'000, 5'000});
   EXPECT_EQ(desk.controller.motion().safety().fault(), wire::Fault::estop);
   std::int32_t powered = 0;
   for (int i = 0; i < 20; ++i)

@@ -21,7 +21,7 @@ namespace {
 using nlohmann::json;
 using namespace std::chrono_literals;
 
-constexpr int patience_ms = 60'000;
+constexpr int answer_timeout_ms = 60'000;
 
 /// As DevTools sends pictures.
 std::string from_base64(const std::string& text) {
@@ -122,7 +122,7 @@ json Browser::next_message() {
       return message;
     }
     pollfd waiting{answers_.get(), POLLIN, 0};
-    if (::poll(&waiting, 1, patience_ms) <= 0) throw std::runtime_error("the browser is silent");
+    if (::poll(&waiting, 1, answer_timeout_ms) <= 0) throw std::runtime_error("the browser is silent");
     std::array<char, 65536> block{};
     const ssize_t got = ::read(answers_.get(), block.data(), block.size());
     if (got <= 0) throw std::runtime_error("the browser has ended");

@@ -1,5 +1,5 @@
 #pragma once
-// `diastole desk` as a whole program, through its door and in a real browser. Screenshots go to the directory that
+// `diastole desk` as a whole program, through its endpoint and in a real browser. Screenshots go to the directory that
 // DIASTOLE_SCREENSHOTS names, if it does.
 
 #include <gmock/gmock.h>

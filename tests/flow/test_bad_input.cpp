@@ -431,7 +431,7 @@ INSTANTIATE_TEST_SUITE_P(Table, BadInputTest, testing::ValuesIn(table()),
                          [](const auto& each) { return each.param.name; });
 
 /// What a command line is refused with.
-std::string told(const std::vector<std::string>& words) {
+std::string reported(const std::vector<std::string>& words) {
   const Workplace place;
   const Ended ended = run(place, words);
   EXPECT_EQ(ended.exit_code, 2);
@@ -439,34 +439,34 @@ std::string told(const std::vector<std::string>& words) {
 }
 
 TEST(BadOption, IsToldWithItsNameItsValueAndWhatIsExpected) {
-  EXPECT_THAT(told({"diastole", "simulate", "e.toml", "-o", "e.run.h5", "--seed", "many"}),
+  EXPECT_THAT(reported({"diastole", "simulate", "e.toml", "-o", "e.run.h5", "--seed", "many"}),
               testing::AllOf(HasSubstr("--seed: \"many\" is not a whole number"),
                              HasSubstr("`diastole simulate --help` explains it")));
-  EXPECT_THAT(told({"diastole", "solve", "gel.study.toml", "--pressure-kPa", "nan"}),
+  EXPECT_THAT(reported({"diastole", "solve", "gel.study.toml", "--pressure-kPa", "nan"}),
               HasSubstr("--pressure-kPa: nan is not a finite number"));
-  EXPECT_THAT(told({"diastole", "scan", "gel.study.toml", "-o", "scan", "--tag-angles", "0,inf"}),
+  EXPECT_THAT(reported({"diastole", "scan", "gel.study.toml", "-o", "scan", "--tag-angles", "0,inf"}),
               HasSubstr("--tag-angles: inf is not a finite number"));
-  EXPECT_THAT(told({"diastole", "scan", "gel.study.toml", "-o", "scan", "--period", "1,2"}),
+  EXPECT_THAT(reported({"diastole", "scan", "gel.study.toml", "-o", "scan", "--period", "1,2"}),
               HasSubstr("--period: \"1,2\" is not a number"));
-  EXPECT_THAT(told({"diastole", "scan", "gel.study.toml", "-o", "scan", "--period", "-1"}),
+  EXPECT_THAT(reported({"diastole", "scan", "gel.study.toml", "-o", "scan", "--period", "-1"}),
               HasSubstr("--period: -1 is not above zero"));
-  EXPECT_THAT(told({"diastole", "jog", "--mL", "5mL"}), HasSubstr("--mL: \"5mL\" is not a number"));
-  EXPECT_THAT(told({"diastole", "fit", "gel.study.toml", "--unexamind"}),
+  EXPECT_THAT(reported({"diastole", "jog", "--mL", "5mL"}), HasSubstr("--mL: \"5mL\" is not a number"));
+  EXPECT_THAT(reported({"diastole", "fit", "gel.study.toml", "--unexamind"}),
               testing::AllOf(HasSubstr("not expected: --unexamind. Did you mean \"--unexamined\"?"),
                              HasSubstr("`diastole fit --help` explains it")));
-  EXPECT_THAT(told({"diastole", "fit", "gel.study.toml", "--mehs", "4,2,1"}),
+  EXPECT_THAT(reported({"diastole", "fit", "gel.study.toml", "--mehs", "4,2,1"}),
               HasSubstr("not expected: --mehs 4,2,1. Did you mean \"--mesh\"?"));
-  EXPECT_THAT(told({"diastole", "fit", "gel.study.toml", "other.study.toml", "--mehs=4,2,1"}),
+  EXPECT_THAT(reported({"diastole", "fit", "gel.study.toml", "other.study.toml", "--mehs=4,2,1"}),
               HasSubstr("not expected: other.study.toml --mehs=4,2,1. Did you mean \"--mesh\"?"));
 }
 
 TEST(MissingArgument, IsToldWithWhatItIsFor) {
-  EXPECT_THAT(told({"diastole", "flow", "scan"}),
+  EXPECT_THAT(reported({"diastole", "flow", "scan"}),
               testing::AllOf(HasSubstr("--output is missing: flow and volume of each image phase"),
                              HasSubstr("`diastole flow --help` explains it")));
-  EXPECT_THAT(told({"diastole", "fit"}), HasSubstr("STUDY is missing: study file"));
-  EXPECT_THAT(told({"diastole", "mesh"}), HasSubstr("one of its commands is missing: import, export"));
-  EXPECT_THAT(told({"diastole", "--json"}), HasSubstr("a command is missing"));
+  EXPECT_THAT(reported({"diastole", "fit"}), HasSubstr("STUDY is missing: study file"));
+  EXPECT_THAT(reported({"diastole", "mesh"}), HasSubstr("one of its commands is missing: import, export"));
+  EXPECT_THAT(reported({"diastole", "--json"}), HasSubstr("a command is missing"));
 }
 
 TEST(BadMeshFile, IsToldWithoutTalkOfStudies) {

@@ -34,12 +34,12 @@ TEST_F(ByHand, SettingsAreShownChangedRefusedAndReset) {
   const Ended changed =
       diastole({"settings", "--set", "backlash_um=40", "--set", "board_name=MR1", "--json"});
   EXPECT_EQ(changed.exit_code, 0) << changed.err;
-  const json told = changed.json();
-  EXPECT_EQ(told["record"], 1);
-  EXPECT_EQ(told["settings"]["backlash_um"], 40.0);
-  EXPECT_EQ(told["settings"]["board_name"], "MR1");
-  EXPECT_EQ(told["settings"]["microsteps"], 8);
-  EXPECT_EQ(told["backlash_microsteps"], 40);
+  const json reported = changed.json();
+  EXPECT_EQ(reported["record"], 1);
+  EXPECT_EQ(reported["settings"]["backlash_um"], 40.0);
+  EXPECT_EQ(reported["settings"]["board_name"], "MR1");
+  EXPECT_EQ(reported["settings"]["microsteps"], 8);
+  EXPECT_EQ(reported["backlash_microsteps"], 40);
   const Ended wild = diastole({"settings", "--set", "backlash_um=4000"});
   EXPECT_EQ(wild.exit_code, 2);
   EXPECT_THAT(wild.err, AllOf(HasSubstr("backlash_um"), HasSubstr("4000"), HasSubstr("0 to 1000")));

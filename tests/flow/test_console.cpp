@@ -1,4 +1,4 @@
-// The web console's door, and that the same rules hold there as at the socket.
+// The web console's endpoint, and that the same rules hold there as at the socket.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -246,9 +246,9 @@ TEST(Console, ManyIdleBrowsersPushNoConsoleOut) {
 
 TEST(Console, TheCommandTellsTheAddressesToWhoMayControl) {
   RigWithConsole rig;
-  const Ended told = run(rig.place, {"diastole", "console", "--socket", rig.path("socket")});
-  EXPECT_EQ(told.exit_code, 0) << told.err;
-  EXPECT_THAT(told.out, AllOf(HasSubstr("/#token=" + rig.control), HasSubstr("/#token=" + rig.watch)));
+  const Ended reported = run(rig.place, {"diastole", "console", "--socket", rig.path("socket")});
+  EXPECT_EQ(reported.exit_code, 0) << reported.err;
+  EXPECT_THAT(reported.out, AllOf(HasSubstr("/#token=" + rig.control), HasSubstr("/#token=" + rig.watch)));
   EXPECT_EQ(code_in(rig.console("anna")->call("console.address")), -32005);
 }
 
@@ -323,9 +323,9 @@ TEST(Console, WithoutTheOptionThereIsNone) {
   RigWithDaemon rig(RigWithDaemon::Time::conducted);
   rig.start_daemon();
   EXPECT_FALSE(json::parse(rig.daemon->out()).contains("console"));
-  const Ended told = run(rig.place, {"diastole", "console", "--socket", rig.path("socket")});
-  EXPECT_EQ(told.exit_code, 1);
-  EXPECT_THAT(told.out, HasSubstr("start it with --console"));
+  const Ended reported = run(rig.place, {"diastole", "console", "--socket", rig.path("socket")});
+  EXPECT_EQ(reported.exit_code, 1);
+  EXPECT_THAT(reported.out, HasSubstr("start it with --console"));
 }
 
 }  // namespace

@@ -134,8 +134,8 @@ TEST(Control, ATakeoverDuringARunIsAnEventOfTheRun) {
   status_when(second, "homed", true);
   const Ended inspected =
       run(rig.place, {"diastole", "inspect", begun["run_file"].get<std::string>(), "--json"});
-  const Ended told = run(rig.place, {"diastole", "inspect", begun["run_file"].get<std::string>()});
-  EXPECT_THAT(told.out, HasSubstr("control_taken_over"));
+  const Ended reported = run(rig.place, {"diastole", "inspect", begun["run_file"].get<std::string>()});
+  EXPECT_THAT(reported.out, HasSubstr("control_taken_over"));
   EXPECT_EQ(inspected.json()["stopped_on_request"], true);
 }
 
@@ -149,9 +149,9 @@ TEST(Control, TheCommandTakesOverAndStatusTellsWho) {
   EXPECT_THAT(refused.err, HasSubstr("--take-over " + own_name()));
   const Ended status = run(rig.place, {"diastole", "status", "--socket", rig.path("socket")});
   EXPECT_THAT(status.out, HasSubstr("control   " + own_name()));
-  const Ended taken =
+  const Ended takeover =
       run(rig.place, {"diastole", "home", "--socket", rig.path("socket"), "--take-over", own_name()});
-  EXPECT_EQ(taken.exit_code, 0) << taken.err;
+  EXPECT_EQ(takeover.exit_code, 0) << takeover.err;
 }
 
 TEST(Control, AStrangerObservesAndStopsAndDoesNothingElse) {

@@ -1,4 +1,4 @@
-// The desk of tagged images: its door, and its page in a real browser.
+// The desk of tagged images: its endpoint, and its page in a real browser.
 
 #include <gmock/gmock.h>
 
@@ -56,9 +56,9 @@ TEST_F(Desk, LetsInOnlyThisMachineWithItsTokenAndWritesNothingElse) {
   }
   EXPECT_FALSE(std::filesystem::exists(place / "gel/dicom.edits.jsonl"))
       << "what does not fit is not written";
-  const WebAnswer taken = post("/edits", mask, token);
-  EXPECT_EQ(taken.status, 200);
-  EXPECT_EQ(json::parse(taken.body)["edits"].size(), 1U);
+  const WebAnswer accepted = post("/edits", mask, token);
+  EXPECT_EQ(accepted.status, 200);
+  EXPECT_EQ(json::parse(accepted.body)["edits"].size(), 1U);
   EXPECT_EQ(choices().size(), 1U);
   // What a person writes meanwhile counts too.
   std::ofstream(place / "gel/dicom.edits.jsonl", std::ios::app) << mask;

@@ -132,13 +132,13 @@ TEST(FlashCommand, SaysToStopTheDaemonWhenThePortIsTaken) {
   const std::string port = (workplace / "port").string();
   Program board(workplace, {"sim_board", factory_image, "--link", port, "--real-time"});
   ASSERT_TRUE(board.wait_for_text("\"port\""));
-  const int taken = ::open(port.c_str(), O_RDWR | O_NOCTTY);
-  ASSERT_EQ(::flock(taken, LOCK_EX | LOCK_NB), 0);
+  const int held_port = ::open(port.c_str(), O_RDWR | O_NOCTTY);
+  ASSERT_EQ(::flock(held_port, LOCK_EX | LOCK_NB), 0);
   const Ended busy = run(workplace, {"diastole", "flash", newer_update, "--port", port});
   EXPECT_EQ(busy.exit_code, 3);
   EXPECT_THAT(busy.err, HasSubstr("in use by another program"));
   EXPECT_THAT(busy.err, HasSubstr("daemon"));
-  ::close(taken);
+  ::close(held_port);
   board.signal(SIGINT);
   (void)board.wait();
 }

@@ -28,8 +28,8 @@ std::vector<double> follow(DaemonClient& client, pid_t daemon) {
   std::vector<double> resident_MB;
   for (json progress; progress.is_null() || progress["state"] == "running";) {
     progress = client.call("run.progress", {{"first_remark", 0}});
-    const uint64_t taken = progress["received"].get<uint64_t>() + progress["missing"].get<uint64_t>();
-    if (taken >= (resident_MB.size() + 1) * samples_a_minute)
+    const uint64_t accounted = progress["received"].get<uint64_t>() + progress["missing"].get<uint64_t>();
+    if (accounted >= (resident_MB.size() + 1) * samples_a_minute)
       resident_MB.push_back(figures_of(daemon).resident_MB);
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }

@@ -165,11 +165,11 @@ TEST_F(ImagedGel, PosesOfWhichNoneIsNamedAndFramesOfOtherPhasesAreTold) {
   place.write("gel/tagged-gel.frames.csv", with(frames, "\n1,0.0120,", "\n1,0.1500,"));
   const Ended fit = run(place, {"diastole", "fit", "gel/tagged-gel.study.toml"});
   EXPECT_THAT(fit.err, HasSubstr("2 poses lie here"));
-  const auto tells_of_frame_1 = HasSubstr(
+  const auto names_frame_1 = HasSubstr(
       "frame 1 is at 150 ms, and the images' phase 1 at 12 ms: does its pressure belong to phase 2?");
-  EXPECT_THAT(fit.err, tells_of_frame_1);
+  EXPECT_THAT(fit.err, names_frame_1);
   const Ended again = run(place, {"diastole", "fit", "gel/tagged-gel.study.toml"});
-  EXPECT_THAT(again.err, testing::AllOf(HasSubstr("Tags of these images are in"), tells_of_frame_1));
+  EXPECT_THAT(again.err, testing::AllOf(HasSubstr("Tags of these images are in"), names_frame_1));
 }
 
 TEST_F(ImagedGel, AScanLeavesItsFolderAndNothingElse) {

@@ -91,10 +91,10 @@ cycles = 2
     const json state = result_of_run(daemon);
     EXPECT_EQ(state["result"]["end"], fault.end);
     EXPECT_EQ(state["result"]["triggers"], 1);
-    bool told = false;
+    bool reported = false;
     for (const json& remark : state["remarks"])
-      told = told || remark["code"] == fault.code;
-    EXPECT_TRUE(told) << state["remarks"].dump();
+      reported = reported || remark["code"] == fault.code;
+    EXPECT_TRUE(reported) << state["remarks"].dump();
     bystander.order(std::string("fault off ") + fault.name);
   }
 }

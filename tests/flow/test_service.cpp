@@ -26,25 +26,24 @@ class Supervisor {
     path.copy(address.sun_path, sizeof(address.sun_path) - 1);
     EXPECT_EQ(::bind(socket_.get(), reinterpret_cast<sockaddr*>(&address), sizeof(address)), 0);
   }
-  /// The first line of the next word; empty if none comes for `patience`.
-  std::string next(std::chrono::milliseconds patience) {
+  /// The first line of the next word; empty if none comes for `timeout`.
+  std::string next(std::chrono::milliseconds timeout) {
     pollfd state{socket_.get(), POLLIN, 0};
-    if (::poll(&state, 1, static_cast<int>(patience.count())) <= 0) return "";
+    if (::poll(&state, 1, static_cast<int>(timeout.count())) <= 0) return "";
     std::array<char, 512> text{};
     const ssize_t size = ::recv(socket_.get(), text.data(), text.size(), 0);
     const std::string word(text.data(), static_cast<size_t>(std::max<ssize_t>(0, size)));
     return word.substr(0, word.find('\n'));
   }
-  /// Reads on to the word; false if it does not come for `patience`.
-  bool hears(const std::string& word, std::chrono::milliseconds patience) {
-    for (std::string heard = next(patience); !heard.empty(); heard = next(patience))
+  /// Reads on to the word; false if it does not come for `timeout`.
+  bool hears(const std::string& word, std::chrono::milliseconds timeout) {
+    for (std::string heard = next(timeout); !heard.empty(); heard = next(timeout))
       if (heard == word) return true;
     return false;
   }
-  /// Reads on until nothing comes for `silence`; false if that does not happen within `patience`.
-  bool falls_silent(std::chrono::milliseconds silence, std::chrono::milliseconds patience) {
-    for (const auto end = std::chrono::steady_clock::now() + patience;
-         std::chrono::steady_clock::now() < end;)
+  /// Reads on until nothing comes for `silence`; false if that does not happen within `timeout`.
+  bool falls_silent(std::chrono::milliseconds silence, std::chrono::milliseconds timeout) {
+    for (const auto end = std::chrono::steady_clock::now() + timeout; std::chrono::steady_clock::now() < end;)
       if (next(silence).empty()) return true;
     return false;
   }

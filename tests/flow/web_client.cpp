@@ -13,8 +13,8 @@ WebClient::WebClient(int port, bool small_window)
     : port_(port), small_window_(small_window), socket_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
   const int bytes = 4096;
   if (small_window) ::setsockopt(socket_.get(), SOL_SOCKET, SO_RCVBUF, &bytes, sizeof(bytes));
-  const timeval patience{60, 0};
-  ::setsockopt(socket_.get(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
+  const timeval timeout{60, 0};
+  ::setsockopt(socket_.get(), SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof(timeout));
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<uint16_t>(port));
@@ -40,9 +40,9 @@ std::string WebClient::take(size_t bytes) {
     if (got <= 0) return {};
     inbox_.append(block.data(), static_cast<size_t>(got));
   }
-  std::string taken = inbox_.substr(0, bytes);
+  std::string received = inbox_.substr(0, bytes);
   inbox_.erase(0, bytes);
-  return taken;
+  return received;
 }
 
 WebAnswer WebClient::read_answer() {

@@ -173,14 +173,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   ControllerClient client(clock, rig(), [&stage] { return std::make_unique<StageLine>(stage); });
   fuzz::Script script({data, size});
   client.connect();
-  int quarrels = 0;  // each may cost a second of turns
-  while (!script.done() && quarrels < 4) {
+  int refusals = 0;  // each may cost a second of turns
+  while (!script.done() && refusals < 4) {
     try {
       play(client, clock, stage, script);
     } catch (const HardwareError&) {
-      ++quarrels;
+      ++refusals;
     } catch (const InputError&) {
-      ++quarrels;
+      ++refusals;
     }
   }
   fuzz::must(client.last_known().state <= wire::kLastState);

@@ -1,4 +1,4 @@
-// Arbitrary bytes at the console's door: an HTTP request, and behind it a message as the WebSocket hands it on. What
+// Arbitrary bytes at the console's endpoint: an HTTP request, and behind it a message as the WebSocket hands it on. What
 // is let in has shown a token, at a place of ours, from no other site's page; what is refused is told so in words; a
 // message is taken or refused.
 //
@@ -22,8 +22,8 @@ void must(bool holds) {
   if (!holds) std::abort();
 }
 
-std::string token_of(const web::Door& door, ConsoleRole role) {
-  const std::string url = door.url(role, web::usual_port);
+std::string token_of(const web::AccessPolicy& policy, ConsoleRole role) {
+  const std::string url = policy.url(role, web::usual_port);
   return url.substr(url.find("token=") + 6);
 }
 
@@ -44,7 +44,7 @@ std::string value_of(const web::Request& request, boost::beast::http::field fiel
   return lower(std::string(request[field]));
 }
 
-/// Told apart from the door's own way to see it, by how such places are written: localhost, 127.x.x.x, [::1], 0:0:...:1.
+/// Independent of AccessPolicy's own check, by how such places are written: localhost, 127.x.x.x, [::1], 0:0:...:1.
 bool is_ours(const std::string& host) {
   if (host == "localhost" || host.starts_with("localhost:")) return true;
   const std::string address = host.substr(0, host.rfind(':'));
@@ -52,10 +52,10 @@ bool is_ours(const std::string& host) {
          host.starts_with('[') || host.starts_with(':') || host.starts_with('0');
 }
 
-void check(const web::Door& door, const web::Request& request, const std::string& control,
+void check(const web::AccessPolicy& policy, const web::Request& request, const std::string& control,
            const std::string& watch) {
   using boost::beast::http::field;
-  const web::Verdict verdict = web::judge(door, request, 0, 16);
+  const web::Verdict verdict = web::judge(policy, request, 0, 16);
   must(1 == int(verdict.refusal.has_value()) + int(verdict.page != nullptr) +
                 int(verdict.asked_role.has_value()) + int(verdict.let_in_as.has_value()));
   if (verdict.refusal) {
@@ -88,20 +88,20 @@ void take_message(const std::string& message) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const web::Door door(web::parse_console_address("", "", ""), "rigpc");
-  static const std::string control = token_of(door, ConsoleRole::control);
-  static const std::string watch = token_of(door, ConsoleRole::watch);
+  static const web::AccessPolicy policy(web::parse_console_address("", "", ""), "rigpc");
+  static const std::string control = token_of(policy, ConsoleRole::control);
+  static const std::string watch = token_of(policy, ConsoleRole::watch);
   std::string bytes(reinterpret_cast<const char*>(data), size);
   put_tokens(bytes, control, watch);
   web::RequestParser parser;
   web::set_bounds(parser);
   boost::beast::error_code error;
-  const size_t taken = parser.put(boost::asio::buffer(bytes), error);
+  const size_t parsed = parser.put(boost::asio::buffer(bytes), error);
   if (error) {
     must(!web::no_request(error).sentence.empty());
   } else if (parser.is_header_done()) {
-    check(door, parser.get(), control, watch);
-    take_message(bytes.substr(taken));
+    check(policy, parser.get(), control, watch);
+    take_message(bytes.substr(parsed));
   }
   return 0;
 }

@@ -33,9 +33,9 @@ using Texts = std::vector<std::string>;
 
 enum class Way : uint8_t { as_it_should_be, left_out, numbers, integers, texts, scalar, text, group };
 
-class Teller {
+class ByteReader {
  public:
-  explicit Teller(std::span<const uint8_t> bytes) : left_(bytes) {}
+  explicit ByteReader(std::span<const uint8_t> bytes) : left_(bytes) {}
 
   uint8_t byte() {
     if (left_.empty()) return 0;
@@ -116,18 +116,18 @@ const char* unit(const std::string& path) { return path.ends_with("_kPa") ? "kPa
 class Author {
  public:
   Author(std::span<const uint8_t> bytes, int descriptor)
-      : tell_(bytes), disk_(descriptor), sink_("fuzz", disk_) {}
+      : input_(bytes), disk_(descriptor), sink_("fuzz", disk_) {}
 
   void attribute(const char* object, const std::string& name, const runfile::Attribute& usual) {
-    switch (tell_.way()) {
+    switch (input_.way()) {
       case Way::left_out:
         return;
       case Way::numbers:
-        return sink_.attribute(object, name, tell_.number());
+        return sink_.attribute(object, name, input_.number());
       case Way::integers:
-        return sink_.attribute(object, name, tell_.integer());
+        return sink_.attribute(object, name, input_.integer());
       case Way::texts:
-        return sink_.attribute(object, name, tell_.text());
+        return sink_.attribute(object, name, input_.text());
       default:
         return sink_.attribute(object, name, usual);
     }
@@ -135,21 +135,21 @@ class Author {
 
   /// `usual` writes the object as it should be.
   void object(const std::string& path, const auto& usual) {
-    switch (tell_.way()) {
+    switch (input_.way()) {
       case Way::as_it_should_be:
         return usual();
       case Way::left_out:
         return;
       case Way::numbers:
-        return sink_.numbers(path, tell_.numbers(tell_.byte() % 16), unit(path));
+        return sink_.numbers(path, input_.numbers(input_.byte() % 16), unit(path));
       case Way::integers:
-        return sink_.table(path, {{"cycles", tell_.integers(tell_.byte() % 4)}}, "1");
+        return sink_.table(path, {{"cycles", input_.integers(input_.byte() % 4)}}, "1");
       case Way::texts:
-        return sink_.table(path, {{"text", tell_.texts(tell_.byte() % 4)}}, "1");
+        return sink_.table(path, {{"text", input_.texts(input_.byte() % 4)}}, "1");
       case Way::scalar:
-        return sink_.scalar(path, tell_.number(), unit(path));
+        return sink_.scalar(path, input_.number(), unit(path));
       case Way::text:
-        return sink_.text(path, tell_.text());
+        return sink_.text(path, input_.text());
       case Way::group:
         return sink_.group(path);
     }
@@ -169,7 +169,7 @@ class Author {
   /// Columns, too, may be left out or of another kind; all are then as long as told, or as the usual ones.
   void table(const std::string& path, std::vector<TableColumn> columns) {
     object(path, [&] {
-      const uint8_t asked = tell_.byte();
+      const uint8_t asked = input_.byte();
       const size_t usual_rows =
           std::visit([](const auto& values) { return values.size(); }, columns[0].values);
       const size_t rows = asked == 0 ? usual_rows : asked % 5;
@@ -183,17 +183,17 @@ class Author {
 
  private:
   void rewrite(TableColumn& column, size_t rows, std::vector<TableColumn>& written) {
-    switch (tell_.way()) {
+    switch (input_.way()) {
       case Way::left_out:
         return;
       case Way::numbers:
-        column.values = tell_.numbers(rows);
+        column.values = input_.numbers(rows);
         break;
       case Way::integers:
-        column.values = tell_.integers(rows);
+        column.values = input_.integers(rows);
         break;
       case Way::texts:
-        column.values = tell_.texts(rows);
+        column.values = input_.texts(rows);
         break;
       default:
         std::visit([rows](auto& values) { values.resize(rows); }, column.values);
@@ -201,7 +201,7 @@ class Author {
     written.push_back(std::move(column));
   }
 
-  Teller tell_;
+  ByteReader input_;
   H5Disk disk_;
   H5Sink sink_;
 };

@@ -120,7 +120,7 @@ const std::vector<Rule>& rules() {
       {"estimator/materials", {"protocol/contract", "estimator/expressions"}},
       {"estimator/inference", {"protocol/contract"}},
       {"estimator/mesh", {"protocol/contract"}},
-      {"estimator/io", {"protocol/contract", "protocol/runfile"}},
+      {"estimator/io", {"protocol/contract", "protocol/runfile", "estimator/inference/termination.hpp"}},
       {"estimator/grids", {"protocol/contract", "protocol/runfile", "estimator/io"}},
       {"estimator/rig", {"protocol/runfile", "estimator/inference"}},
       {"estimator/fe", {"estimator/materials", "estimator/mesh", "estimator/parallel", "estimator/sparse"}},

@@ -63,7 +63,7 @@ struct End {
   using Maker = void (*)(std::uint32_t, Message&);
   ReliableLink link;
   Maker sends, expects;
-  std::uint32_t sent = 0, taken = 0;
+  std::uint32_t sent = 0, received_count = 0;
   std::uint64_t wrong = 0;
 
   void fill() {
@@ -77,7 +77,7 @@ struct End {
       const auto received = link.receive(byte, now_us);
       if (!received || received->delivery == wire::Delivery::datagram) continue;
       Message expected;
-      expects(taken++, expected);
+      expects(received_count++, expected);
       const bool same = received->type == static_cast<std::uint8_t>(expected.type) &&
                         std::ranges::equal(received->payload, expected.bytes);
       wrong += same ? 0 : 1;
@@ -142,11 +142,11 @@ class Campaign {
 
   void forge() {
     Message message;
-    make_command(controller_.taken + 4, message);
+    make_command(controller_.received_count + 4, message);
     std::array<std::uint8_t, wire::kMaxEncodedBytes> encoded{};
     const wire::FrameHeader header{host_.link.session(), wire::FrameKind::sequenced,
                                    static_cast<std::uint8_t>(message.type),
-                                   static_cast<std::uint8_t>(controller_.taken), 0};
+                                   static_cast<std::uint8_t>(controller_.received_count), 0};
     const std::uint8_t end = 0;
     controller_.take({&end, 1}, now_us_);
     controller_.take(wire::encode_frame(header, message.bytes, encoded), now_us_);
@@ -170,10 +170,10 @@ class Campaign {
       found.rejected += counters.crc_errors + counters.framing_errors;
       found.wrong += end->wrong;
     }
-    found.commands = controller_.taken;
-    found.telemetry = host_.taken;
-    found.missing = (host_.sent - std::min(host_.sent, controller_.taken)) +
-                    (controller_.sent - std::min(controller_.sent, host_.taken));
+    found.commands = controller_.received_count;
+    found.telemetry = host_.received_count;
+    found.missing = (host_.sent - std::min(host_.sent, controller_.received_count)) +
+                    (controller_.sent - std::min(controller_.sent, host_.received_count));
     found.worst_recovery_ms = worst_recovery_ms_;
     return found;
   }

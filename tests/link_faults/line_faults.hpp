@@ -8,7 +8,7 @@
 //
 // The line is cut into frames at the 0x00 that ends each (protocol/wire/frame.hpp). Whole frames are lost,
 // repeated, overtaken by up to kMostOvertaking others or cut off; then single bytes vanish and single bits flip,
-// the delimiters among them. What has no end within kPatience_us travels on as it is.
+// the delimiters among them. What has no end within kTimeout_us travels on as it is.
 
 #include <algorithm>
 #include <cstdint>
@@ -47,7 +47,7 @@ struct FaultCounts {
 class LineFaults {
  public:
   static constexpr unsigned kMostOvertaking = 3;
-  static constexpr std::uint64_t kPatience_us = 20'000;
+  static constexpr std::uint64_t kTimeout_us = 20'000;
 
   LineFaults(FaultRates rates, std::uint64_t seed) : rates_(rates), random_(seed) {}
 
@@ -63,7 +63,7 @@ class LineFaults {
   }
   /// What has come through by now.
   std::vector<std::uint8_t> take(std::uint64_t now_us) {
-    if (!begun_.empty() && now_us >= begun_us_ + kPatience_us) {
+    if (!begun_.empty() && now_us >= begun_us_ + kTimeout_us) {
       pass_on(std::move(begun_), now_us);
       begun_.clear();
     }
@@ -83,7 +83,7 @@ class LineFaults {
     if (!flying_.empty()) consider(flying_.front().due_us);
     for (const Held& held : held_)
       consider(held.deadline_us);
-    if (!begun_.empty()) consider(begun_us_ + kPatience_us);
+    if (!begun_.empty()) consider(begun_us_ + kTimeout_us);
     return next;
   }
 
@@ -115,7 +115,7 @@ class LineFaults {
     if (happens(rates_.reordering)) {
       ++counts_.reordered;
       const auto overtaking = 1 + static_cast<unsigned>(random_() % kMostOvertaking);
-      held_.push_back({overtaking, now_us + kPatience_us, std::move(frame)});
+      held_.push_back({overtaking, now_us + kTimeout_us, std::move(frame)});
       return;
     }
     const bool twice = happens(rates_.repetition);

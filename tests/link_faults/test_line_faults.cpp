@@ -19,7 +19,7 @@ Bytes frame(std::uint8_t number) {
 Bytes after(LineFaults& line, std::uint8_t frames) {
   for (std::uint8_t i = 0; i < frames; ++i)
     line.push(frame(i), 0);
-  return line.take(LineFaults::kPatience_us);
+  return line.take(LineFaults::kTimeout_us);
 }
 
 TEST(LineFaults, AGoodLineChangesNothing) {
@@ -36,9 +36,9 @@ TEST(LineFaults, AGoodLineChangesNothing) {
 TEST(LineFaults, WhatHasNoEndTravelsOnAfterAWhile) {
   LineFaults line({}, 1);
   line.push(Bytes{1, 2, 3}, 0);
-  EXPECT_TRUE(line.take(LineFaults::kPatience_us - 1).empty());
-  EXPECT_EQ(line.next_due_us(), LineFaults::kPatience_us);
-  EXPECT_EQ(line.take(LineFaults::kPatience_us), (Bytes{1, 2, 3}));
+  EXPECT_TRUE(line.take(LineFaults::kTimeout_us - 1).empty());
+  EXPECT_EQ(line.next_due_us(), LineFaults::kTimeout_us);
+  EXPECT_EQ(line.take(LineFaults::kTimeout_us), (Bytes{1, 2, 3}));
   EXPECT_FALSE(line.next_due_us());
 }
 

@@ -25,10 +25,10 @@ double time_ns(const Evaluate& evaluate) {
   const std::clock_t begun = std::clock();  // of the processor: what is beside costs time too
   for (size_t i = 0; i < evaluations; ++i)
     kept += evaluate(1e-9 * static_cast<double>(i));
-  const std::clock_t taken = std::clock() - begun;
+  const std::clock_t elapsed = std::clock() - begun;
   volatile double sink = kept;
   (void)sink;
-  return 1e9 * static_cast<double>(taken) / CLOCKS_PER_SEC / static_cast<double>(evaluations);
+  return 1e9 * static_cast<double>(elapsed) / CLOCKS_PER_SEC / static_cast<double>(evaluations);
 }
 
 struct Times {

@@ -166,13 +166,13 @@ std::string port_of(const HiddenEffect& effect) {
 
 std::optional<bool> is_port_right(const ScoredCase& c) {
   if (c.found.where.empty() || c.found.verdict == Verdict::none) return std::nullopt;
-  bool told = false;
+  bool port_known = false;
   for (const HiddenEffect& effect : c.truth.hidden) {
     const std::string port = port_of(effect);
-    told = told || !port.empty();
+    port_known = port_known || !port.empty();
     if (port == c.found.where.front().port) return true;
   }
-  return told ? std::optional(false) : std::nullopt;
+  return port_known ? std::optional(false) : std::nullopt;
 }
 
 struct ParameterError {

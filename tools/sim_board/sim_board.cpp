@@ -50,7 +50,7 @@ struct SimBoard::Board {
              [this](uint32_t offset, uint32_t bytes) {
                if (flash_listener) flash_listener(offset, bytes);
              }}) {
-    if (options.cell_seed) chip.flash.doubt_cells(*options.cell_seed);
+    if (options.cell_seed) chip.flash.randomise_cut_cells(*options.cell_seed);
   }
 
   void note_missed(uint8_t timer, uint8_t channel, Cycles late_by) {

@@ -29,7 +29,7 @@ class ControlClient {
     if (::send(socket_.get(), sent.data(), sent.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(sent.size())) {
       throw HardwareError(path_, "the simulated rig has gone", "Start it again.");
     }
-    while (const auto answer = line(answer_patience)) {
+    while (const auto answer = line(answer_timeout)) {
       if (answer->starts_with("held ")) {
         held_ = answer->substr(5);
       } else if (answer->starts_with("ok")) {
@@ -50,11 +50,11 @@ class ControlClient {
   }
 
  private:
-  static constexpr std::chrono::milliseconds answer_patience{10'000};
+  static constexpr std::chrono::milliseconds answer_timeout{10'000};
 
   /// The next whole line, if it comes in time.
-  std::optional<std::string> line(std::chrono::milliseconds patience) {
-    const auto give_up = std::chrono::steady_clock::now() + patience;
+  std::optional<std::string> line(std::chrono::milliseconds timeout) {
+    const auto give_up = std::chrono::steady_clock::now() + timeout;
     while (true) {
       if (const size_t end = inbox_.find('\n'); end != std::string::npos) {
         std::string found = inbox_.substr(0, end);

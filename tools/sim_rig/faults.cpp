@@ -26,92 +26,90 @@ constexpr std::array known_faults{
     FaultKind{.name = "estop",
               .looks_like =
                   "emergency stop pressed: fault 1, the motor is cut off within a step, the run ends faulted",
-              .set = [](RigInTrouble& in,
+              .set = [](FaultTarget& in,
                         Value value) { in.rig.controller().hold_switch(Switch::estop, value.has_value()); }},
     FaultKind{
         .name = "far-limit",
         .looks_like = "far limit switch closed: fault 2 while inflating, no start",
-        .set = [](RigInTrouble& in,
+        .set = [](FaultTarget& in,
                   Value value) { in.rig.controller().hold_switch(Switch::far_limit, value.has_value()); }},
     FaultKind{.name = "home-limit",
               .looks_like = "home switch closed: fault 3 outside of homing, the position is lost",
-              .set = [](RigInTrouble& in,
+              .set = [](FaultTarget& in,
                         Value value) { in.rig.controller().hold_switch(Switch::home, value.has_value()); }},
     FaultKind{
         .name = "power-cut",
         .looks_like =
             "controller without supply: all pins low, the line silent; off: it boots, unhomed, new boot id",
-        .set = [](RigInTrouble& in, Value value) { in.rig.controller().set_power(!value); }},
+        .set = [](FaultTarget& in, Value value) { in.rig.controller().set_power(!value); }},
     // Of the cables to the host and to the scanner.
     FaultKind{.name = "serial-hangup",
               .looks_like = "serial cable (USB) pulled out: link_lost at once, the pump stops within its "
                             "lease; off: plugged in",
-              .set = [](RigInTrouble& in,
+              .set = [](FaultTarget& in,
                         Value value) { value ? in.cables.line.hang_up() : in.cables.line.plug_in(); }},
     FaultKind{.name = "serial-silence",
               .looks_like = "serial line hangs, nothing passes either way: link_lost after 1 s, the pump "
                             "stops within its lease",
-              .set = [](RigInTrouble& in, Value value) { in.cables.to_host = in.cables.from_host = !value; }},
+              .set = [](FaultTarget& in, Value value) { in.cables.to_host = in.cables.from_host = !value; }},
     FaultKind{.name = "serial-deaf",
               .looks_like = "what the host sends is lost, the controller is heard: fault 5 (lease_lost)",
-              .set = [](RigInTrouble& in, Value value) { in.cables.from_host = !value; }},
+              .set = [](FaultTarget& in, Value value) { in.cables.from_host = !value; }},
     FaultKind{.name = "gate-lost",
               .looks_like = "gating cable cut: TTL and R-wave do not reach the scanner (pin trace); the "
                             "controller counts them",
-              .set = [](RigInTrouble& in, Value value) { in.cables.to_scanner = !value; }},
+              .set = [](FaultTarget& in, Value value) { in.cables.to_scanner = !value; }},
     // Of the pressure instrument.
     FaultKind{.name = "daq-stall",
               .looks_like = "instrument answers nothing: time-outs, a gap as long as it lasts",
-              .set = [](RigInTrouble& in, Value value) { in.instrument.faults().stall = window(value); }},
+              .set = [](FaultTarget& in, Value value) { in.instrument.faults().stall = window(value); }},
     FaultKind{.name = "daq-drop",
               .looks_like = "instrument closes its connections and takes none: a gap as long as it lasts",
-              .set = [](RigInTrouble& in, Value value) { in.instrument.faults().drop = window(value); }},
+              .set = [](FaultTarget& in, Value value) { in.instrument.faults().drop = window(value); }},
     FaultKind{"daq-delay", "s", 0, 1000, 0.05,
               "instrument's answers come late: time-outs or slow samples, never an old answer for a new one",
-              [](RigInTrouble& in, Value value) {
+              [](FaultTarget& in, Value value) {
                 in.instrument.faults().delay = window(value);
                 in.instrument.faults().delay_ns =
                     static_cast<uint64_t>(std::llround(value.value_or(0) * 1e9));
               }},
-    FaultKind{
-        .name = "daq-error",
-        .looks_like = "instrument answers with Modbus exception 11: a gap as long as it lasts",
-        .set = [](RigInTrouble& in, Value value) { in.instrument.faults().refuse = value.has_value(); }},
+    FaultKind{.name = "daq-error",
+              .looks_like = "instrument answers with Modbus exception 11: a gap as long as it lasts",
+              .set = [](FaultTarget& in, Value value) { in.instrument.faults().refuse = value.has_value(); }},
     FaultKind{
         .name = "daq-short",
         .looks_like = "answers break off in the middle (short reads): a gap as long as it lasts",
-        .set = [](RigInTrouble& in, Value value) { in.instrument.faults().cut_short = value.has_value(); }},
+        .set = [](FaultTarget& in, Value value) { in.instrument.faults().cut_short = value.has_value(); }},
     FaultKind{.name = "daq-stuck",
               .looks_like = "the reading freezes: one and the same value while the pump goes on",
-              .set = [](RigInTrouble& in, Value value) { in.instrument.faults().stuck = value.has_value(); }},
-    FaultKind{
-        "daq-clock-jump", "s", -50, 50, 0.5,
-        "the instrument's timer is ahead: a step in its clock, samples keep their times",
-        [](RigInTrouble& in, Value value) { in.instrument.faults().timer_ahead_s = value.value_or(0); }},
+              .set = [](FaultTarget& in, Value value) { in.instrument.faults().stuck = value.has_value(); }},
+    FaultKind{"daq-clock-jump", "s", -50, 50, 0.5,
+              "the instrument's timer is ahead: a step in its clock, samples keep their times",
+              [](FaultTarget& in, Value value) { in.instrument.faults().timer_ahead_s = value.value_or(0); }},
     // Of transducer, phantom, hose and piston; their physics is in tools/sim_rig/plant.
     FaultKind{
         "sensor-offset", "kPa", -1000, 1000, 0.5, "cavity transducer off by a constant",
-        [](RigInTrouble& in, Value value) { in.rig.plant().cavity_sensor().falsify(value.value_or(0), 0); }},
+        [](FaultTarget& in, Value value) { in.rig.plant().cavity_sensor().falsify(value.value_or(0), 0); }},
     FaultKind{
         "sensor-drift", "kPa/s", -100, 100, 0.05,
         "cavity transducer drifts: the least pressure of each cycle climbs",
-        [](RigInTrouble& in, Value value) { in.rig.plant().cavity_sensor().falsify(0, value.value_or(0)); }},
+        [](FaultTarget& in, Value value) { in.rig.plant().cavity_sensor().falsify(0, value.value_or(0)); }},
     FaultKind{"leak", "mL/s/kPa", 0, 1000, 2,
               "cannula leaks: each cycle's peak lower than the last, suction at the least volume",
-              [](RigInTrouble& in, Value value) { in.rig.plant().leak(value.value_or(0)); }},
+              [](FaultTarget& in, Value value) { in.rig.plant().leak(value.value_or(0)); }},
     FaultKind{"air-bubble", "mL", 0, 10000, 100,
               "air in the cavity: lower and softer peaks, most under small pressure",
-              [](RigInTrouble& in, Value value) { in.rig.plant().admit({.rest_mL = value.value_or(0)}); }},
+              [](FaultTarget& in, Value value) { in.rig.plant().admit({.rest_mL = value.value_or(0)}); }},
     FaultKind{"blocked-hose", "share open", 0.01, 1, 0.1,
               "hose kinked at the cannula: the pressure at the pump's end climbs with the flow; the "
               "cavity hardly changes",
-              [](RigInTrouble& in, Value value) { in.rig.plant().block(value.value_or(1)); }},
+              [](FaultTarget& in, Value value) { in.rig.plant().block(value.value_or(1)); }},
     FaultKind{"step-loss", "share lost", 0, 1, 1,
               "motor stalls: the piston follows fewer steps than are counted, the pressure stays behind",
-              [](RigInTrouble& in, Value value) { in.rig.carriage().slip().lose(value.value_or(0)); }},
+              [](FaultTarget& in, Value value) { in.rig.carriage().slip().lose(value.value_or(0)); }},
     FaultKind{"slipping-coupling", "kPa", 0, 1000, 15,
               "coupling slips above this pressure at the piston: volume is lost with every stroke",
-              [](RigInTrouble& in, Value value) { in.rig.carriage().slip().slip_above(value); }},
+              [](FaultTarget& in, Value value) { in.rig.carriage().slip().slip_above(value); }},
 };
 
 }  // namespace

@@ -24,7 +24,7 @@ struct Cables {
 };
 
 /// What a fault can reach.
-struct RigInTrouble {
+struct FaultTarget {
   Rig& rig;
   sim_daq::ModbusInstrument& instrument;
   Cables& cables;
@@ -38,7 +38,7 @@ struct FaultKind {
   double usual = 0;  ///< without a value
   std::string_view looks_like;
   /// Switches it on with a value, or off, at the rig's present. Switching on anew changes the value.
-  void (*set)(RigInTrouble&, std::optional<double> value) = nullptr;
+  void (*set)(FaultTarget&, std::optional<double> value) = nullptr;
 
   /// `given`, or the usual value. Throws InputError when it takes none or the value is outside its range.
   [[nodiscard]] double value(std::optional<double> given) const;

@@ -98,7 +98,7 @@ RigDescription read_rig_description(TableReader root) {
   TableReader daq = root.table("daq");
   read_channels(daq, description);
   constexpr int64_t usual_timeout_ms = 20, ns_per_ms = 1'000'000;
-  description.daq_patience_ns = static_cast<uint64_t>(
+  description.daq_timeout_ns = static_cast<uint64_t>(
       ns_per_ms * daq.integer_or("timeout_ms", usual_timeout_ms, {.at_least = 1, .at_most = 1000}));
   if (auto simulation = root.table_if("simulation")) read_simulation(*simulation, description);
   description.plant.hose.segments = segments_for(description.plant.hose);

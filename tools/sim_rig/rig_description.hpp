@@ -36,7 +36,7 @@ struct RigDescription {
   double microstep_mL = 0;
   std::vector<DaqChannel> channels;
   double daq_clock_error_ppm = 0;
-  uint64_t daq_patience_ns = 0;  ///< of the daemon for one answer: timeout_ms of [daq]
+  uint64_t daq_timeout_ns = 0;  ///< of the daemon for one answer: timeout_ms of [daq]
 };
 
 /// Throws InputError. Keys that concern only the daemon are left to the daemon to check.

@@ -17,7 +17,7 @@ namespace diastole::sim_rig {
 class RunClock {
  public:
   /// The controller sends bytes, whether or not they arrive; its clock read 0 at tick_zero_ns.
-  void overhear(std::span<const uint8_t> bytes, uint64_t tick_zero_ns) {
+  void observe(std::span<const uint8_t> bytes, uint64_t tick_zero_ns) {
     for (const uint8_t byte : bytes) {
       const auto frame = decoder_.push(byte);
       if (frame && frame->ok()) take(frame->value(), tick_zero_ns);

@@ -44,7 +44,7 @@ int64_t gained_ns(uint64_t time_ns, double ppm) {
 Server::Server(const RigDescription& description,
                std::unique_ptr<sim_controller::SimulatedController> controller, const ServerOptions& options)
     : options_(options),
-      daq_patience_ns_(description.daq_patience_ns),
+      daq_timeout_ns_(description.daq_timeout_ns),
       cables_(options.link),
       rig_(description, std::move(controller),
            {.sent = [this](std::span<const uint8_t> bytes) { take_sent(bytes); },
@@ -134,14 +134,14 @@ void Server::advance_to(uint64_t until_ns) {
 }
 
 void Server::set(const FaultKind& kind, std::optional<double> value) {
-  RigInTrouble rig{rig_, instrument_, cables_};
+  FaultTarget rig{rig_, instrument_, cables_};
   kind.set(rig, value);
   faults_on_.erase(kind.name);
   if (value) faults_on_[kind.name] = *value;
 }
 
 void Server::take_sent(std::span<const uint8_t> bytes) {
-  run_clock_.overhear(bytes, rig_.controller().tick_zero_ns());
+  run_clock_.observe(bytes, rig_.controller().tick_zero_ns());
   if (cables_.to_host) cables_.line.write(bytes);
 }
 
@@ -182,9 +182,9 @@ uint64_t Server::host_ns() const {
 /// A conducted daemon that waits for its instrument moves no time: it is moved for it.
 sim_daq::Wait Server::let_wait(uint64_t late_ns) {
   if (!conducted()) return sim_daq::Wait::goes_on;
-  advance_to(rig_.now_ns() + std::min(late_ns, daq_patience_ns_));
-  conductor_->answer({host_ns(), conductor::unasked});
-  return late_ns < daq_patience_ns_ ? sim_daq::Wait::is_over : sim_daq::Wait::given_up;
+  advance_to(rig_.now_ns() + std::min(late_ns, daq_timeout_ns_));
+  conductor_->answer({host_ns(), conductor::unsolicited});
+  return late_ns < daq_timeout_ns_ ? sim_daq::Wait::is_over : sim_daq::Wait::given_up;
 }
 
 void Server::hold_or_answer(const conductor::Advanced& answer) {

@@ -76,7 +76,7 @@ class Server {
   [[nodiscard]] std::string state() const;
 
   ServerOptions options_;
-  uint64_t daq_patience_ns_;
+  uint64_t daq_timeout_ns_;
   Cables cables_;
   std::optional<sim_controller::PinTrace> pins_;
   std::optional<VolumeTrace> volume_;

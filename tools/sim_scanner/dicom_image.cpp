@@ -73,8 +73,8 @@ void write_dicom(const std::filesystem::path& path, const Picture& picture, cons
   const Storage storage = storage_of(label);
   put(DCM_Manufacturer, manufacturer_of(label));
   // One maker leaves it to the pixels to show which image is which.
-  const bool is_untold = label.velocity && label.velocity->maker == Maker::ge;
-  put(DCM_ImageType, is_untold               ? "ORIGINAL\\PRIMARY\\OTHER"
+  const bool is_unstated = label.velocity && label.velocity->maker == Maker::ge;
+  put(DCM_ImageType, is_unstated             ? "ORIGINAL\\PRIMARY\\OTHER"
                      : storage.units.empty() ? "ORIGINAL\\PRIMARY\\M"
                                              : "ORIGINAL\\PRIMARY\\P");
   if (label.velocity && label.velocity->says_venc && label.velocity->maker == Maker::siemens)

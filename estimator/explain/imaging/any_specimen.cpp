@@ -247,19 +247,19 @@ class AnySpecimen final : public ImagedSpecimen {
   [[nodiscard]] std::optional<FieldHypothesis> beside(const FieldHypothesis& first,
                                                       const FieldHypothesis& second) {
     FieldChoice choice = second.fit.choice;
-    double rooms = first.has_inclusion() ? places() : 1.0;
+    double place_count = first.has_inclusion() ? places() : 1.0;
     if (second.has_inclusion()) {
       const InclusionGuess guess = search_inclusion(*lattice_, volume_mm3_, first.fit).front();
       if (guess.p_value > beyond_chance) return {};
       choice = inclusion_from(guess, first.fit).fit.choice;
-      rooms = places();
+      place_count = places();
     }
     FieldHypothesis pair{{first.ids.front(), second.ids.front()},
                          problem_.fit(together(first.fit.choice, choice), first.fit)};
     std::ranges::sort(pair.ids);
     const auto parameters = static_cast<double>(pair.fit.choice.free.size());
     const auto all = static_cast<double>(effects_.size());
-    const double tried = 0.5 * all * (all - 1.0) * rooms;
+    const double tried = 0.5 * all * (all - 1.0) * place_count;
     pair.gain = base().chi_square - pair.fit.chi_square;
     pair.score = pair.gain - mesh_error() - 2.0 * parameters - 2.0 * std::log(tried);
     pair.p_value =

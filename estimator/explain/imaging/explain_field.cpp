@@ -135,10 +135,10 @@ class Explainer {
   };
   /// If it is a pressure that is furthest off, and beyond what one in two thousand is.
   [[nodiscard]] std::optional<PressureStrain> contradicted_pressure(const FieldFit& fit) const {
-    constexpr double telling = 3.5;
+    constexpr double significant_sds = 3.5;
     const PriorStrain strain = prior_strain(fit);
     Index slot = 0;
-    if (!(strain.off.cwiseAbs().maxCoeff(&slot) > telling)) return std::nullopt;
+    if (!(strain.off.cwiseAbs().maxCoeff(&slot) > significant_sds)) return std::nullopt;
     if (slot >= static_cast<Index>(fit.pressures_kPa.size())) return std::nullopt;
     const int number = specimen_.rows().frames()[static_cast<size_t>(slot)];
     const Frame& frame = specimen_.field().measurement.frames[static_cast<size_t>(number)];

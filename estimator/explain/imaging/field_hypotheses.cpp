@@ -116,29 +116,30 @@ FieldHypothesis fit_both(FieldProblem& problem, const FieldFit& base, const Fiel
 std::vector<FieldHypothesis> inclusions_beside(const FieldProblem& problem, const FieldFit& base,
                                                const std::vector<const FieldHypothesis*>& others,
                                                const InclusionLattice& lattice) {
-  struct Promise {
+  struct Candidate {
     const FieldHypothesis* other;
     InclusionGuess guess;
     double gain;
   };
   const double volume_mm3 = wall_volume_mm3(problem.field().base);
-  std::vector<Promise> promises;
+  std::vector<Candidate> candidates;
   for (const FieldHypothesis* other : others) {
     const InclusionGuess guess = search_inclusion(lattice, volume_mm3, other->fit).front();
-    if (guess.p_value < beyond_chance) promises.push_back({other, guess, other->gain + guess.gain});
+    if (guess.p_value < beyond_chance) candidates.push_back({other, guess, other->gain + guess.gain});
   }
-  std::ranges::stable_sort(promises, std::greater{}, &Promise::gain);
-  if (promises.size() > inclusions_fitted) promises.resize(inclusions_fitted);
+  std::ranges::stable_sort(candidates, std::greater{}, &Candidate::gain);
+  if (candidates.size() > inclusions_fitted) candidates.resize(inclusions_fitted);
   std::vector<FieldHypothesis> pairs;
-  for (const Promise& promise : promises) {
+  for (const Candidate& candidate : candidates) {
     const FieldHypothesis inclusion{{std::string(inclusion_effect().text().id)}, {}};
-    FieldFit fit = fit_inclusion(problem, promise.other->fit, promise.guess.inclusion, InclusionEffort::once);
-    if (fit.chi_square < promise.other->fit.chi_square && &promise == &promises.front())
-      fit = fit_inclusion(problem, promise.other->fit, inclusion_of(fit), InclusionEffort::fully);
+    FieldFit fit =
+        fit_inclusion(problem, candidate.other->fit, candidate.guess.inclusion, InclusionEffort::once);
+    if (fit.chi_square < candidate.other->fit.chi_square && &candidate == &candidates.front())
+      fit = fit_inclusion(problem, candidate.other->fit, inclusion_of(fit), InclusionEffort::fully);
     const double parameters =
-        effective_parameters + static_cast<double>(promise.other->fit.choice.free.size());
+        effective_parameters + static_cast<double>(candidate.other->fit.choice.free.size());
     pairs.push_back(
-        judged(std::move(fit), base, *promise.other, inclusion, parameters, distinct_places(volume_mm3)));
+        judged(std::move(fit), base, *candidate.other, inclusion, parameters, distinct_places(volume_mm3)));
   }
   return pairs;
 }

@@ -11,7 +11,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 PriorStrain prior_strain(const FieldFit& fit) {
-  constexpr double told_by_others = 1e-6;  // of a prior's own variance: less is rounding
+  constexpr double determined_by_others = 1e-6;  // of a prior's own variance: less is rounding
   const Index count = fit.priors.size();
   const MatrixXd slopes = fit.jacobian.bottomRows(count);
   const MatrixXd left = MatrixXd::Identity(count, count) - slopes * fit.covariance * slopes.transpose();
@@ -26,7 +26,7 @@ PriorStrain prior_strain(const FieldFit& fit) {
   const Eigen::SelfAdjointEigenSolver<MatrixXd> combinations(left);
   for (Index i = 0; i < count; ++i) {
     const double share = combinations.eigenvalues()[i];
-    if (!(share > told_by_others)) continue;
+    if (!(share > determined_by_others)) continue;
     const double residual = combinations.eigenvectors().col(i).dot(fit.priors);
     strain.chi_square += residual * residual / share;
     strain.degrees += 1.0;

@@ -80,7 +80,7 @@ void SpecimenProblem::fit_base() {
   ChangedMotion motion(changes_of({}, specimen_), estimated_.groups, {});
   std::vector<std::string> remarks;
   const FitOutcome outcome =
-      fit_from_where_it_stands(motion, estimated_, field_.measurement, options, remarks);
+      fit_from_current_values(motion, estimated_, field_.measurement, options, remarks);
   if (outcome.history.empty() || outcome.frames.empty()) refuse_base(outcome.reason);
   for (const std::string& remark : remarks)
     report_(remark);

@@ -28,21 +28,21 @@ constexpr size_t singles_fitted = 6;
 constexpr size_t pairs_fitted = 4;
 constexpr size_t seconds_fitted = 3;  ///< beside the best single effect that was fitted
 /// Of 2 ln likelihood by an effect, below which its prior odds alone speak against it.
-const double least_promise = 2.0 * std::log(1.0 / effect_odds);
+const double least_gain = 2.0 * std::log(1.0 / effect_odds);
 constexpr double second_in_reach =
-    50.0;                      ///< nats behind the best of its size, beyond which a set is not taken again
-constexpr size_t retaken = 2;  ///< best sets of each size that are fitted with tolerances that are not linear
+    50.0;  ///< nats behind the best of its size, beyond which a set is not taken again
+constexpr size_t refitted_sets = 2;  ///< best sets of each size, fitted with tolerances that are not linear
 constexpr double least_amplitude = 0.5,
                  most_amplitude = 2.0;  ///< of a response: beyond, another size stands for it
 
 /// Responses that together promise a gain.
-struct Promise {
+struct ScreenedSet {
   double gain = 0.0;  ///< of 2 ln likelihood
   std::vector<size_t> responses;
 };
 
-/// Promises are right within their sizes' spacing: what promises half of the best, or is among the first, may turn out best.
-bool is_worth_fitting(const std::vector<Promise>& sorted, size_t i, double least) {
+/// Screened gains are right within their sizes' spacing: what promises half of the best, or is among the first, may turn out best.
+bool is_worth_fitting(const std::vector<ScreenedSet>& sorted, size_t i, double least) {
   constexpr size_t first = 3;
   return sorted[i].gain > least && (i < first || sorted[i].gain > 0.5 * sorted.front().gain);
 }
@@ -117,30 +117,30 @@ class Screening {
   MatrixXd products_;
 };
 
-/// The best promise of each set of ids, the largest first.
-class Promises {
+/// The best gain of each set of ids, the largest first.
+class ScreenedSets {
  public:
-  explicit Promises(const std::vector<Response>& responses) : responses_(responses) {}
-  void add(Promise promise) {
+  explicit ScreenedSets(const std::vector<Response>& responses) : responses_(responses) {}
+  void add(ScreenedSet candidate) {
     std::vector<std::string_view> ids;
-    for (const size_t i : promise.responses)
+    for (const size_t i : candidate.responses)
       ids.push_back(responses_[i].term.effect->text().id);
     std::ranges::sort(ids);
     ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-    Promise& best = best_[ids];
-    if (promise.gain > best.gain) best = std::move(promise);
+    ScreenedSet& best = best_[ids];
+    if (candidate.gain > best.gain) best = std::move(candidate);
   }
-  [[nodiscard]] std::vector<Promise> sorted() const {
-    std::vector<Promise> list;
-    for (const auto& [ids, promise] : best_)
-      if (!promise.responses.empty()) list.push_back(promise);
-    std::ranges::sort(list, std::greater(), &Promise::gain);
+  [[nodiscard]] std::vector<ScreenedSet> sorted() const {
+    std::vector<ScreenedSet> list;
+    for (const auto& [ids, candidate] : best_)
+      if (!candidate.responses.empty()) list.push_back(candidate);
+    std::ranges::sort(list, std::greater(), &ScreenedSet::gain);
     return list;
   }
 
  private:
   const std::vector<Response>& responses_;
-  std::map<std::vector<std::string_view>, Promise> best_;
+  std::map<std::vector<std::string_view>, ScreenedSet> best_;
 };
 
 class SetSearch {
@@ -195,7 +195,7 @@ class SetSearch {
   }
   void search_from_base();
   void take_base_for_finer(double times);
-  [[nodiscard]] double promised_if_finer(double times, const EffectSet& plain) const;
+  [[nodiscard]] double gain_if_finer(double times, const EffectSet& plain) const;
   void search_if_finer();
   void fit_plain_and_singles_again();
   [[nodiscard]] bool is_plain_near() const;
@@ -207,10 +207,10 @@ class SetSearch {
                                               const std::vector<size_t>& chosen) const;
   [[nodiscard]] std::optional<double> posterior_beside_part(const EffectSet& set) const;
   [[nodiscard]] bool is_fitted(const std::vector<const Effect*>& effects) const;
-  [[nodiscard]] std::vector<Promise> promises(const Screening& screening, bool pairs) const;
+  [[nodiscard]] std::vector<ScreenedSet> screened_sets(const Screening& screening, bool pairs) const;
   /// From the base.
-  [[nodiscard]] std::vector<Promise> promises(const rig::EvidenceFit& under, bool pairs) const {
-    return promises(Screening(responses_, base_.target(problem_), base_.columns, under), pairs);
+  [[nodiscard]] std::vector<ScreenedSet> screened_sets(const rig::EvidenceFit& under, bool pairs) const {
+    return screened_sets(Screening(responses_, base_.target(problem_), base_.columns, under), pairs);
   }
   /// The most probable first; what has no solution is no set.
   void sort_sets() {
@@ -227,8 +227,8 @@ class SetSearch {
   std::vector<EffectSet> sets_;
 };
 
-std::vector<Promise> SetSearch::promises(const Screening& screening, bool pairs) const {
-  Promises best(responses_);
+std::vector<ScreenedSet> SetSearch::screened_sets(const Screening& screening, bool pairs) const {
+  ScreenedSets best(responses_);
   for (size_t i = 0; i < responses_.size(); ++i) {
     if (!pairs) best.add({screening.single(i), {i}});
     for (size_t j = i + 1; j < responses_.size(); ++j)
@@ -326,14 +326,13 @@ void SetSearch::fit_beside_best() {
   if (best == nullptr) return;
   const EffectSet first = *best;
   const Screening screening(responses_, first.target(), first.columns, first.evidence);
-  Promises promised(responses_);
+  ScreenedSets seconds(responses_);
   for (size_t i = 0; i < responses_.size(); ++i)
-    if (responses_[i].term.effect != first.model.terms.back().effect)
-      promised.add({screening.single(i), {i}});
+    if (responses_[i].term.effect != first.model.terms.back().effect) seconds.add({screening.single(i), {i}});
   size_t count = 0;
-  for (const Promise& promise : promised.sorted()) {
-    if (++count > seconds_fitted || promise.gain < least_promise) break;
-    const Response& response = responses_[promise.responses.front()];
+  for (const ScreenedSet& candidate : seconds.sorted()) {
+    if (++count > seconds_fitted || candidate.gain < least_gain) break;
+    const Response& response = responses_[candidate.responses.front()];
     if (is_fitted({first.model.terms.back().effect, response.term.effect})) continue;
     SessionModel start = first.model;
     start.terms.push_back(response.term);
@@ -365,7 +364,7 @@ bool SetSearch::relieves(const Effect* effect, const EffectSet& set) const {
   const VectorXd weight = set.evidence.variance.cwiseSqrt().cwiseInverse();
   const Index tolerances = set.model.u.size() - static_cast<Index>(rig::basic_nuisances);
   for (Index i = 0; i < tolerances; ++i) {
-    if (std::pow(set.model.u.tail(tolerances)[i], 2) < least_promise) continue;
+    if (std::pow(set.model.u.tail(tolerances)[i], 2) < least_gain) continue;
     const VectorXd strained = weight.cwiseProduct(set.columns.rightCols(tolerances).col(i)).normalized();
     for (const Response& response : responses_)
       if (response.term.effect == effect &&
@@ -423,7 +422,7 @@ std::optional<double> SetSearch::posterior_beside_part(const EffectSet& set) con
         most_joined(Screening(responses_, part.target(), part.columns, part.evidence), others, {});
     const double odds =
         set.log_posterior - set.evidence.log_evidence - (part.log_posterior - part.evidence.log_evidence);
-    if (most.gain < least_promise * static_cast<double>(others.size()))
+    if (most.gain < least_gain * static_cast<double>(others.size()))
       return part.log_posterior + most.log_evidence + odds;
   }
   return {};
@@ -435,7 +434,8 @@ void SetSearch::fit_best_again(size_t effects) {
   double best = 0.0;
   for (EffectSet& set : sets_) {
     if (added(set) != effects) continue;
-    if (is_behind(set) || ++count > retaken || (count > 1 && set.log_posterior < best - second_in_reach))
+    if (is_behind(set) || ++count > refitted_sets ||
+        (count > 1 && set.log_posterior < best - second_in_reach))
       break;
     if (const auto posterior = posterior_beside_part(set)) {
       set.log_posterior = *posterior;
@@ -496,9 +496,9 @@ void SetSearch::search_from_base() {
       fit_linear(base_.target(problem_), base_.columns, problem_.error(), plain.evidence.shares);
   report("fitting the effects that promise most");
   for (const rig::EvidenceFit* under : {&stated, &adapted}) {
-    const std::vector<Promise> singles = promises(*under, false);
+    const std::vector<ScreenedSet> singles = screened_sets(*under, false);
     for (size_t i = 0; i < std::min(singles_fitted, singles.size()); ++i)
-      if (is_worth_fitting(singles, i, least_promise)) fit(singles[i].responses);
+      if (is_worth_fitting(singles, i, least_gain)) fit(singles[i].responses);
   }
   for (const Effect* effect : problem_.session().effects.of_rig())
     if (effect->change_points() != ChangePoints::none) fit_events(plain, *effect);
@@ -506,10 +506,9 @@ void SetSearch::search_from_base() {
   fit_plain_and_singles_again();
   report("fitting the pairs that promise most");
   for (const rig::EvidenceFit* under : {&stated, &adapted}) {
-    const std::vector<Promise> singles = promises(*under, false);
-    const std::vector<Promise> pairs = promises(*under, true);
-    const double least =
-        least_promise + std::max(least_promise, singles.empty() ? 0.0 : singles.front().gain);
+    const std::vector<ScreenedSet> singles = screened_sets(*under, false);
+    const std::vector<ScreenedSet> pairs = screened_sets(*under, true);
+    const double least = least_gain + std::max(least_gain, singles.empty() ? 0.0 : singles.front().gain);
     for (size_t i = 0; i < std::min(pairs_fitted / 2, pairs.size()); ++i)
       if (is_worth_fitting(pairs, i, least)) fit(pairs[i].responses);
   }
@@ -528,7 +527,7 @@ void SetSearch::take_base_for_finer(double times) {
 
 /// The log posterior that the best set would have in a rig of parts so many times finer: the rig without effects that was fitted, and
 /// the responses, by linear algebra. What effects with moments would do is not among them.
-double SetSearch::promised_if_finer(double times, const EffectSet& plain) const {
+double SetSearch::gain_if_finer(double times, const EffectSet& plain) const {
   const rig::TolerancePrior finer = problem_.finer_prior(times);
   const VectorXd target = plain.target();
   MatrixXd columns = plain.columns;
@@ -537,8 +536,8 @@ double SetSearch::promised_if_finer(double times, const EffectSet& plain) const 
   const Screening screening(responses_, target, columns, fit);
   double most = 0.0;
   for (const bool pairs : {false, true}) {
-    const std::vector<Promise> best = promises(screening, pairs);
-    if (!best.empty()) most = std::max(most, 0.5 * (best.front().gain - (pairs ? 2.0 : 1.0) * least_promise));
+    const std::vector<ScreenedSet> best = screened_sets(screening, pairs);
+    if (!best.empty()) most = std::max(most, 0.5 * (best.front().gain - (pairs ? 2.0 : 1.0) * least_gain));
   }
   return fit.log_evidence + most + plain.log_posterior - plain.evidence.log_evidence;
 }
@@ -554,8 +553,8 @@ void SetSearch::search_if_finer() {
   const double log_odds = -std::log(static_cast<double>(finer.size()));
   double best = 0.0, most = -std::numeric_limits<double>::infinity();
   for (const double times : finer) {
-    const double promised = promised_if_finer(times, *plain) + log_odds;
-    if (promised > most) std::tie(most, best) = std::pair(promised, times);
+    const double gain = gain_if_finer(times, *plain) + log_odds;
+    if (gain > most) std::tie(most, best) = std::pair(gain, times);
   }
   if (most < best_posterior() - linear_errs) return;
   report("seeking the same in a rig of finer parts");
@@ -579,8 +578,9 @@ WeighedSets SetSearch::run() {
   responses_ = effect_responses(problem_, base_, stated.variance.cwiseSqrt());
   WeighedSets found;
   found.given = options_.terms.size();
-  for (const Promise& promise : promises(stated, false))
-    found.promises.emplace_back(responses_[promise.responses.front()].term.effect->text().id, promise.gain);
+  for (const ScreenedSet& candidate : screened_sets(stated, false))
+    found.single_gains.emplace_back(responses_[candidate.responses.front()].term.effect->text().id,
+                                    candidate.gain);
   search_from_base();
   search_if_finer();
   double sum = 0.0;

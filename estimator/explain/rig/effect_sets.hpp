@@ -51,8 +51,8 @@ struct EffectSet {
 struct WeighedSets {
   std::vector<EffectSet> sets;  ///< the most probable first; one of them has no effects
   std::vector<double> probability;
-  std::vector<std::pair<std::string, double>> promises;  ///< of single effects: the gain of 2 ln evidence
-  size_t given = 0;                                      ///< effects that every set has
+  std::vector<std::pair<std::string, double>> single_gains;  ///< of single effects: the gain of 2 ln evidence
+  size_t given = 0;                                          ///< effects that every set has
 };
 
 struct SetSearchOptions {

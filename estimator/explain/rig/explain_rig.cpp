@@ -78,13 +78,13 @@ std::optional<NextExperiment> next_experiment(const Study& study, const rig::Ses
   if (found.verdict == Verdict::named) return sharpening_experiment(design, fitted_model(problem, chosen));
   // Ambiguous sets are separated from each other, a hint from nothing.
   std::vector<FittedModel> models{fitted_model(problem, chosen)};
-  std::set<std::vector<std::string>> told{chosen.ids()};
+  std::set<std::vector<std::string>> seen{chosen.ids()};
   for (const EffectSet& set : search.sets) {
     const bool rival = found.verdict == Verdict::ambiguous
                            ? std::ranges::count(found.ambiguous_with, set.ids()) > 0
                            : !found.hints.empty() && set.ids().empty() != chosen.ids().empty();
     // Of a set in rigs of several tolerances the most probable stands for it.
-    if (rival && told.insert(set.ids()).second) models.push_back(fitted_model(problem, set));
+    if (rival && seen.insert(set.ids()).second) models.push_back(fitted_model(problem, set));
   }
   std::vector<const FittedModel*> competing;
   for (const FittedModel& model : models)

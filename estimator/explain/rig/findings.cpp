@@ -173,11 +173,11 @@ std::vector<Candidate> candidates(const EffectLibrary& known, const WeighedSets&
   std::map<std::vector<std::string>, double> probability;
   for (size_t k = 0; k < search.sets.size(); ++k)
     probability[search.sets[k].ids()] += search.probability[k];
-  std::set<std::vector<std::string>> told{plain->ids()};
+  std::set<std::vector<std::string>> reported{plain->ids()};
   for (size_t k = 0; k < search.sets.size(); ++k) {
     const EffectSet& set = search.sets[k];
     const EffectSet& chosen = search.sets[verdict.chosen];
-    if ((k != verdict.chosen && set.ids() == chosen.ids()) || !told.insert(set.ids()).second) continue;
+    if ((k != verdict.chosen && set.ids() == chosen.ids()) || !reported.insert(set.ids()).second) continue;
     Candidate row{
         set.ids(), 2.0 * (set.log_posterior - plain->log_posterior), true, set.model.values.size(), {}, ""};
     if (k == verdict.chosen) {
@@ -192,13 +192,13 @@ std::vector<Candidate> candidates(const EffectLibrary& known, const WeighedSets&
     if (!inference::is_settled(set.termination)) row.verdict += "; its search did not end";
     list.push_back(std::move(row));
   }
-  for (const auto& promise : search.promises)
+  for (const auto& single : search.single_gains)
     if (std::ranges::none_of(list,
-                             [&](const Candidate& row) { return row.ids == std::vector{promise.first}; }))
-      list.push_back({{promise.first},
-                      promise.second,
+                             [&](const Candidate& row) { return row.ids == std::vector{single.first}; }))
+      list.push_back({{single.first},
+                      single.second,
                       false,
-                      known.find(promise.first)->parameters().size(),
+                      known.find(single.first)->parameters().size(),
                       {},
                       "promises too little"});
   return list;

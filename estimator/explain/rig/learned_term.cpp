@@ -277,8 +277,8 @@ CurveEvidence evidence_of(const LawCandidate& law) {
 }
 
 /// What is missing for the best law to be proposed; empty: nothing.
-std::string shortcoming(const std::vector<double>& gains, const ChangeSize& size, const Gap& gap,
-                        const ErrorKnowledge& known) {
+std::string reason_rejected(const std::vector<double>& gains, const ChangeSize& size, const Gap& gap,
+                            const ErrorKnowledge& known) {
   if (!predicts_better(gains, port_laws().size()))
     return "does not predict waveforms better that it was not fitted to, beyond what chance does";
   if (size.is_tolerance) return "changes no more than the rig's tolerances may";
@@ -314,7 +314,7 @@ Learning learn_term(const rig::SessionProblem& problem, const EffectSet& set, co
   EffectSet stated = with;
   stated.evidence.variance = problem.error().variance(problem.error().prior.share);
   const Gap gap = held_out_gap(problem, before, stated);
-  if (const std::string lacks = shortcoming(best.gains, size, gap, known); !lacks.empty())
+  if (const std::string lacks = reason_rejected(best.gains, size, gap, known); !lacks.empty())
     return {{}, fmt::format("the best, {} by {}, {}", best.law->sets, best.law->of, lacks)};
   LearnedTerm term;
   term.port = name_of(best.law->port);

@@ -15,9 +15,9 @@ namespace diastole::explain {
 namespace {
 
 constexpr size_t most_segments = 3;
-constexpr double worth_it = 1.08;    // gain by one segment more
-constexpr double clear_sigma = 5.0;  // beyond this nobody needs more equipment
-constexpr double bother = 1.3;       // gain that is worth connecting something
+constexpr double worth_it = 1.08;        // gain by one segment more
+constexpr double clear_sigma = 5.0;      // beyond this nobody needs more equipment
+constexpr double worthwhile_gain = 1.3;  // gain that is worth connecting something
 constexpr size_t most_models = 3;
 
 std::string ids_of(const FittedModel& fit) {
@@ -84,7 +84,7 @@ Plan plan_of(const rig::Session& session, const std::vector<runfile::Segment>& s
         Equipment{true, pump, false, true, true}, Equipment{true, pump, true, true, true}}) {
     if (best.worth >= enough) break;
     Plan other = plan_with(more);
-    if (other.worth > bother * best.worth) best = std::move(other);
+    if (other.worth > worthwhile_gain * best.worth) best = std::move(other);
   }
   return best;
 }

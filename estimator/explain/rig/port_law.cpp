@@ -90,9 +90,9 @@ VariableRanges variable_ranges(const rig::SessionProblem& problem, const rig::Se
   }
   VariableRanges ranges{{"phase", {0.0, 1.0}}, {"cycle", {0.0, cycles}}, {"t", {0.0, longest_s}}};
   for (auto& [name, list] : values) {
-    const size_t seldom = list.size() / 500;
+    const size_t trimmed = list.size() / 500;
     std::ranges::sort(list);
-    ranges[name] = {list[seldom], list[list.size() - 1 - seldom]};
+    ranges[name] = {list[trimmed], list[list.size() - 1 - trimmed]};
   }
   return ranges;
 }

@@ -209,7 +209,7 @@ double nothing_wrong_by_chance(const rig::SessionProblem& problem, const EffectS
 
 /// That a model is wrong of which what is seen is so seldom by chance, at even odds before: the most that a p-value can mean
 /// (Sellke, Bayarri and Berger 2001).
-double wrong_if_seldom(double by_chance) {
+double probability_wrong(double by_chance) {
   if (by_chance <= 0.0) return 1.0;
   constexpr double says_nothing = 1.0 / std::numbers::e;
   return by_chance < says_nothing ? 1.0 / (1.0 - std::numbers::e * by_chance * std::log(by_chance)) : 0.5;
@@ -334,7 +334,7 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const WeighedSets& sea
   if (by_chance <= surprising_by_chance || is_irregular || !settled) {
     out.verdict = Verdict::unexplained;
     out.confidence =
-        settled ? wrong_if_seldom(is_irregular ? std::min(by_chance, irregular) : by_chance) : 0.5;
+        settled ? probability_wrong(is_irregular ? std::min(by_chance, irregular) : by_chance) : 0.5;
     return out;
   }
   if (out.confidence < name_probability) {
@@ -360,7 +360,7 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const WeighedSets& sea
   out.verdict = is_clean ? Verdict::none : is_more && predicted ? Verdict::named : Verdict::unexplained;
   if (out.verdict == Verdict::unexplained)
     out.confidence = std::max(predicted ? 0.0 : 1.0 / (1.0 + std::exp(odds)),
-                              out.tone ? wrong_if_seldom(out.tone->p_value) : 0.0);
+                              out.tone ? probability_wrong(out.tone->p_value) : 0.0);
   return out;
 }
 

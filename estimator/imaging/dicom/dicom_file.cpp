@@ -137,17 +137,17 @@ Component component_of(const FrameItems& items) {
   const auto of_text = [](const std::string& word) {
     if (word == "P" || word == "PHASE" || word == "PHASE MAP" || word == "VELOCITY") return Component::phase;
     if (word == "M" || word == "MAGNITUDE" || word == "M_FFE") return Component::magnitude;
-    return Component::unsaid;
+    return Component::unstated;
   };
   const auto said = items.find(DCM_MRImageFrameTypeSequence,
                                [](DcmItem& item) { return text(item, DCM_ComplexImageComponent); });
   if (said) return of_text(*said);
-  Component found = Component::unsaid;
+  Component found = Component::unstated;
   for (unsigned long i = 2; i < 8; ++i) {
     const auto word = text(items.dataset(), DCM_ImageType, i);
-    const Component said_here = word ? of_text(*word) : Component::unsaid;
-    if (said_here == Component::phase) return said_here;
-    if (said_here != Component::unsaid) found = said_here;
+    const Component stated_here = word ? of_text(*word) : Component::unstated;
+    if (stated_here == Component::phase) return stated_here;
+    if (stated_here != Component::unstated) found = stated_here;
   }
   return found;
 }

@@ -15,7 +15,7 @@ namespace diastole::imaging {
 using Image = Eigen::ArrayXXf;  ///< rows x columns, after the rescale slope and intercept
 
 /// What the header says the pixels are; the pixels themselves have the last word (estimator/imaging/series/image_folder.hpp).
-enum class Component { unsaid, magnitude, phase };
+enum class Component { unstated, magnitude, phase };
 
 struct VelocityEncoding {
   double venc_cm_s;
@@ -43,7 +43,7 @@ struct ImageHeader {
   std::optional<double> trigger_ms;     ///< (0018,1060), or (0020,9153) of an enhanced image
   std::optional<double> interval_ms;    ///< the cycle: (0018,1062), or (0020,9251)
   std::optional<int> phases_announced;  ///< (0018,1090)
-  Component component = Component::unsaid;
+  Component component = Component::unstated;
   bool says_tagged = false;  ///< (0018,9028)
   std::optional<VelocityEncoding> velocity;
   std::optional<DiffusionEncoding> diffusion;

@@ -176,8 +176,9 @@ void require_known_turns(const FlowMeasurement& flow, const std::string& folder)
     const size_t last = (k + count - 1) % count;
     const double step = std::max(std::abs(core[k] - core[last]) / gap[last],
                                  std::abs(core[(k + 1) % count] - core[k]) / gap[k]);
-    const bool told = step < sure_step * half_turn * cm_s || flow.lumen.turn_margin[k] > sure_margin;
-    if (told && flow.lumen.phase_chi_square[k] < std::max(worst_chi_square, worst_wrapped * best)) continue;
+    const bool unambiguous = step < sure_step * half_turn * cm_s || flow.lumen.turn_margin[k] > sure_margin;
+    if (unambiguous && flow.lumen.phase_chi_square[k] < std::max(worst_chi_square, worst_wrapped * best))
+      continue;
     throw InputError(
         {folder, fmt::format("{}, phase at {:.0f} ms", flow.scan.name, 1e3 * flow.scan.time_s[k]),
          fmt::format(

@@ -153,11 +153,11 @@ class Sorter {
 
   /// Where a series holds several kinds of picture and its headers do not say which is which, the pixels do.
   void settle_components() {
-    std::map<std::string, std::vector<size_t>> unsaid;
+    std::map<std::string, std::vector<size_t>> unstated;
     for (size_t image = 0; image < folder_.images.size(); ++image) {
-      if (header(image).component == Component::unsaid) unsaid[header(image).series_uid].push_back(image);
+      if (header(image).component == Component::unstated) unstated[header(image).series_uid].push_back(image);
     }
-    for (const auto& series : unsaid) {
+    for (const auto& series : unstated) {
       const std::vector<size_t>& images = series.second;
       std::vector<Component> found(images.size());
       constexpr size_t together = 64;  // a file of many frames is opened once for so many

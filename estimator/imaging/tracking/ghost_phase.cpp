@@ -29,7 +29,7 @@ struct Over {
 };
 
 /// Pixels within `reach_mm` of one around which the residuals are too large.
-PixelMask spoilt_pixels(const TagView& view, const TrackedPhase& phase, double reach_mm) {
+PixelMask corrupted_pixels(const TagView& view, const TrackedPhase& phase, double reach_mm) {
   const auto rows = static_cast<Eigen::Index>(reach_mm / view.plane.row_spacing_mm);
   const auto columns = static_cast<Eigen::Index>(reach_mm / view.plane.column_spacing_mm);
   const auto around = [&](auto& map, Eigen::Index row, Eigen::Index column) {
@@ -47,19 +47,19 @@ PixelMask spoilt_pixels(const TagView& view, const TrackedPhase& phase, double r
                            most_around * phase.noise * phase.noise * static_cast<double>((near != 0).count());
     }
   }
-  PixelMask spoilt = large;
+  PixelMask corrupted = large;
   for (Eigen::Index column = 0; column < large.cols(); ++column) {
     for (Eigen::Index row = 0; row < large.rows(); ++row) {
-      if (large(row, column)) around(spoilt, row, column) = true;
+      if (large(row, column)) around(corrupted, row, column) = true;
     }
   }
-  return spoilt;
+  return corrupted;
 }
 
 std::vector<Over> fitted_pixels(const TagView& view, const TrackedView& tracked, size_t k,
                                 const Ghost& ghost) {
   const TrackedPhase& phase = tracked.phases[k];
-  const PixelMask spoilt = spoilt_pixels(view, phase, tracked.waves[0].spacing_mm());
+  const PixelMask corrupted = corrupted_pixels(view, phase, tracked.waves[0].spacing_mm());
   const Image variance = phase.materials.unaryExpr([&](Material material) {
     return static_cast<float>(phase.noise * phase.noise *
                               (material == Material::nothing ? dark_variance : 1));
@@ -67,7 +67,7 @@ std::vector<Over> fitted_pixels(const TagView& view, const TrackedView& tracked,
   std::vector<Over> pixels;
   for (Eigen::Index column = 0; column < phase.residual.cols(); ++column) {
     for (Eigen::Index row = 0; row < phase.residual.rows(); ++row) {
-      if (phase.residual(row, column) == 0 || spoilt(row, column)) continue;
+      if (phase.residual(row, column) == 0 || corrupted(row, column)) continue;
       const Eigen::Vector2d x_mm = view.place_mm(row, column);
       Over pixel{row,
                  column,

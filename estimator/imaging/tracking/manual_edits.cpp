@@ -153,17 +153,17 @@ ManualEdit edit_of(const EditLine& line, EditAction action, size_t number, const
 void undo(const EditLine& line, ManualEdits& edits) {
   line.allow({"action", "line"});
   if (edits.standing.empty()) line.refuse("nothing is left to undo", "Delete this line.");
-  auto taken_back = std::prev(edits.standing.end());
+  auto revoked = std::prev(edits.standing.end());
   if (line.has("line")) {
     const int wanted = line.whole("line", "It is the number of a line above this one.");
-    taken_back = std::find_if(edits.standing.begin(), edits.standing.end(), [&](const ManualEdit& edit) {
+    revoked = std::find_if(edits.standing.begin(), edits.standing.end(), [&](const ManualEdit& edit) {
       return static_cast<int>(edit.file_line) == wanted;
     });
-    if (taken_back == edits.standing.end())
+    if (revoked == edits.standing.end())
       line.refuse(fmt::format("line {} is no choice that stands", wanted),
                   "Name a line above that was not undone before, or none for the last.");
   }
-  edits.standing.erase(taken_back);
+  edits.standing.erase(revoked);
   ++edits.undone;
 }
 

@@ -9,10 +9,10 @@ namespace diastole::stm32 {
 namespace {
 
 /// Turns of a waiting loop at 16 MHz: some 0.1 s, fifty times what a crystal takes to start.
-constexpr unsigned kPatience = 200'000;
+constexpr unsigned kMostTurns = 200'000;
 
 bool wait_for(const Register& reg, std::uint32_t bits) {
-  for (unsigned turn = 0; turn < kPatience; ++turn)
+  for (unsigned turn = 0; turn < kMostTurns; ++turn)
     if ((reg.read() & bits) == bits) return true;
   return false;
 }

@@ -59,7 +59,7 @@ FlashFault erase(const FlashSector& sector) {
     if (!Unlocked::done()) return FlashFault::refused;
   }
   for (std::uint32_t offset = 0; offset < sector.bytes; offset += 4)
-    if (word_at(sector.address + offset) != 0xFFFF'FFFF) return FlashFault::not_taken;
+    if (word_at(sector.address + offset) != 0xFFFF'FFFF) return FlashFault::verify_failed;
   return FlashFault::none;
 }
 
@@ -78,7 +78,7 @@ FlashFault program(std::uint32_t address, std::span<const std::uint32_t> words) 
     }
   }
   for (const std::uint32_t word : words) {
-    if (word_at(address) != word) return FlashFault::not_taken;
+    if (word_at(address) != word) return FlashFault::verify_failed;
     address += 4;
   }
   return FlashFault::none;

@@ -20,10 +20,10 @@ namespace diastole::stm32 {
 
 enum class FlashFault : std::uint8_t {
   none = 0,
-  not_erased,  ///< a zero would have to become a one: erase the sector first
-  refused,     ///< the interface set an error flag (write protection, sequence, alignment)
-  not_taken,   ///< it reads back otherwise
-  supply_low,  ///< below what the flash needs (supply.hpp): nothing was begun
+  not_erased,     ///< a zero would have to become a one: erase the sector first
+  refused,        ///< the interface set an error flag (write protection, sequence, alignment)
+  verify_failed,  ///< it reads back otherwise
+  supply_low,     ///< below what the flash needs (supply.hpp): nothing was begun
 };
 
 /// Makes every byte of the sector 0xFF.

@@ -128,7 +128,7 @@ wire::SelfTestReport LoopBack::measure(wire::SelfTestItem item, std::uint16_t ar
   wire::SelfTestReport report;
   report.item = item;
   report.argument = argument;
-  const InterruptHeld steps_are_nobodys(kTim5);
+  const InterruptHeld step_interrupt_held(kTim5);
   switch (item) {
     case wire::SelfTestItem::pulse:
       pulse(report, ttl_active_low);

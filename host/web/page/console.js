@@ -9,7 +9,7 @@ const keptTheme = "diastole-theme";
 const staleAfter_ms = 1500;
 const lostAfter_ms = 6000;
 const sleptAfter_ms = 2000;  // a look that comes so late: the browser let the page sleep
-const stopPatience_ms = 700;
+const stopTimeout_ms = 700;
 const mostEvents = 500;
 const rowsAtOnce = 1000;  // that the daemon sends in one answer
 
@@ -43,10 +43,10 @@ const daemon = new Daemon(takeToken(), { heard, changed });
 const text = (id, words) => { if (by(id).textContent !== words) by(id).textContent = words; };
 const grouped = (number) => String(number).replace(/\B(?=(\d{3})+$)/g, "\u2009");
 const plural = (count, word) => `${grouped(count)} ${word}${count === 1 ? "" : "s"}`;
-const sleepers = new Set();
+const pendingSleeps = new Set();
 const sleep = (ms) => new Promise((done) => {
-  const end = () => { sleepers.delete(end); done(); };
-  sleepers.add(end);
+  const end = () => { pendingSleeps.delete(end); done(); };
+  pendingSleeps.add(end);
   setTimeout(end, ms);
 });
 
@@ -259,9 +259,9 @@ async function withControl(method, params = {}) {
   } catch (error) {
     if (!(error instanceof Refused) || error.code !== codes.controlHeld) throw error;
     const sentence = `${error.message.split(";")[0]}. If that is agreed between you, take the control over: the log and the run’s events will tell both names.`;
-    const taken = await askTakeover(sentence[0].toUpperCase() + sentence.slice(1),
+    const confirmed = await askTakeover(sentence[0].toUpperCase() + sentence.slice(1),
                                     (holder) => daemon.call("control.take", { take_over: holder }));
-    if (!taken) return false;
+    if (!confirmed) return false;
     if (method !== "control.take") await daemon.call(method, params);
   }
   return true;
@@ -275,15 +275,15 @@ function order(button, title, method) {
 async function stop(how) {
   const title = daemon.isOpen ? "The daemon has not confirmed the stop: press the emergency stop"
     : "The stop did not reach the daemon: press the emergency stop";
-  let told = false;
-  const tellProblem = (error) => { told = true; showProblem(title, error); };
-  const late = setTimeout(() => tellProblem(new Error("It was sent, and nothing came back.")), stopPatience_ms);
+  let reported = false;
+  const reportProblem = (error) => { reported = true; showProblem(title, error); };
+  const late = setTimeout(() => reportProblem(new Error("It was sent, and nothing came back.")), stopTimeout_ms);
   try {
     const { stopping } = await daemon.call("run.stop", { how });
-    if (told) by("problem-dialog").close();
+    if (reported) by("problem-dialog").close();
     flash(stopping ? "Stopping …" : "Nothing was moving");
   } catch (error) {
-    tellProblem(error);
+    reportProblem(error);
   }
   clearTimeout(late);
 }
@@ -346,7 +346,7 @@ setTheme(localStorage.getItem(keptTheme) ?? (matchMedia("(prefers-color-scheme: 
 setInterval(showFreshness, 250);
 addEventListener("visibilitychange", () => {
   showFreshness();
-  for (const end of sleepers) end();
+  for (const end of pendingSleeps) end();
 });
 daemon.connect();
 repeat(() => 200, askStatus);

@@ -61,16 +61,16 @@ class FibresCommand : public testing::Test {
 };
 
 TEST_F(FibresCommand, MeasuresAFieldThatAStudyTakes) {
-  const auto told =
+  const auto reported =
       nlohmann::json::parse(output({"--study", path("heart.study.toml"), "-o", path("heart.fibres.csv"),
                                     "--tensors", path("tensors.csv"), "--page", path("page.html"), "--record",
                                     path("record.json"), "--grid", path("fibres.vtkhdf"), "--json"}));
-  EXPECT_EQ(told["b_values"], (std::vector<double>{0, 1000}));
-  EXPECT_EQ(told["directions"], 12);
-  EXPECT_TRUE(told["outliers"].empty());
-  EXPECT_EQ(told["axis_check"]["ok"], true);
-  EXPECT_GT(told["rms_deg"], 1.0);
-  EXPECT_EQ(told["problems"][0]["id"], "image-missing");
+  EXPECT_EQ(reported["b_values"], (std::vector<double>{0, 1000}));
+  EXPECT_EQ(reported["directions"], 12);
+  EXPECT_TRUE(reported["outliers"].empty());
+  EXPECT_EQ(reported["axis_check"]["ok"], true);
+  EXPECT_GT(reported["rms_deg"], 1.0);
+  EXPECT_EQ(reported["problems"][0]["id"], "image-missing");
   for (const char* file : {"heart.fibres.csv", "tensors.csv", "page.html", "record.json", "fibres.vtkhdf"})
     EXPECT_GT(std::filesystem::file_size(path(file)), 1000U) << file;
   EXPECT_THAT(test::run_command({"report", path("record.json"), "-o", path("again.html")}).output,
@@ -97,7 +97,7 @@ TEST_F(FibresCommand, MeasuresAFieldThatAStudyTakes) {
 TEST_F(FibresCommand, FibresOfAnotherSpecimenAreTold) {
   (void)output({"--study", path("heart.study.toml"), "-o", path("heart.fibres.csv")});
   std::vector<FibrePointRow> rows = read_fibre_points(path("heart.fibres.csv"));
-  const auto told = [&] {
+  const auto reported = [&] {
     folder_.write("other.fibres.csv", fibre_points_text(rows));
     folder_.write("other.study.toml", study("fibres = \"other.fibres.csv\"\n"));
     std::string ids;
@@ -105,17 +105,17 @@ TEST_F(FibresCommand, FibresOfAnotherSpecimenAreTold) {
       ids += finding.id + " ";
     return ids;
   };
-  EXPECT_EQ(told(), "");
+  EXPECT_EQ(reported(), "");
   std::mt19937 random(2);
   std::normal_distribution<double> normal;
   for (FibrePointRow& row : rows) {
     const Eigen::Vector3d any = Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
     row.direction = {any.x(), any.y(), any.z()};
   }
-  EXPECT_EQ(told(), "fibres-misfit ");
+  EXPECT_EQ(reported(), "fibres-misfit ");
   for (size_t i = 0; i < rows.size(); i += 2)
     rows[i].place_mm[0] += 500;
-  EXPECT_EQ(told(), "fibres-beside fibres-misfit ");
+  EXPECT_EQ(reported(), "fibres-beside fibres-misfit ");
 }
 
 TEST_F(FibresCommand, GivesTheFieldAtPlaces) {

@@ -24,7 +24,7 @@ class HostileData : public testing::Test {
     arguments.insert(arguments.end(), more.begin(), more.end());
     testing::internal::CaptureStderr();
     const test::Outcome outcome = test::run_command(arguments);
-    told_ = testing::internal::GetCapturedStderr();
+    stderr_text_ = testing::internal::GetCapturedStderr();
     code_ = outcome.code;
     return nlohmann::json::parse(outcome.output);
   }
@@ -49,15 +49,15 @@ class HostileData : public testing::Test {
   }
 
   ThinnedPhantom phantom_;
-  std::string told_;
+  std::string stderr_text_;
   ExitCode code_{};
 };
 
 TEST_F(HostileData, SoundDataAreFittedWithoutAWord) {
   const auto sound = fit();
   EXPECT_EQ(code_, ExitCode::done);
-  EXPECT_THAT(ids(sound), IsEmpty()) << told_;
-  EXPECT_THAT(told_, HasSubstr("Examining the data"));
+  EXPECT_THAT(ids(sound), IsEmpty()) << stderr_text_;
+  EXPECT_THAT(stderr_text_, HasSubstr("Examining the data"));
 }
 
 TEST_F(HostileData, FivePerCentOfWildPointsAreToldAndHardlyCount) {
@@ -73,9 +73,9 @@ TEST_F(HostileData, FivePerCentOfWildPointsAreToldAndHardlyCount) {
     row[ThinnedPhantom::place + 1] *= factor;
   });
   const auto spoilt = fit();
-  ASSERT_EQ(code_, ExitCode::done) << told_;
+  ASSERT_EQ(code_, ExitCode::done) << stderr_text_;
   EXPECT_THAT(ids(spoilt), Contains("wild-points"));
-  EXPECT_THAT(told_, HasSubstr("warning: "));
+  EXPECT_THAT(stderr_text_, HasSubstr("warning: "));
   EXPECT_NEAR(stiffness_kPa(spoilt), sound_kPa,
               0.03 * sound_kPa);  // one standard error of so few points is 2 %
   EXPECT_GT(spoilt.at("robust").at("wild").get<int>(), 20);
@@ -134,8 +134,8 @@ TEST_F(HostileData, CentimetresAreRefusedBeforeTheFit) {
   const auto spoilt = fit({"-o", phantom_.file("gel.fit.json")});
   EXPECT_EQ(code_, ExitCode::negative);
   EXPECT_THAT(ids(spoilt), Contains("length-unit"));
-  EXPECT_THAT(told_, testing::AllOf(HasSubstr("centimetres"), HasSubstr("Multiply"),
-                                    HasSubstr("--unexamined"), testing::Not(HasSubstr("iteration"))));
+  EXPECT_THAT(stderr_text_, testing::AllOf(HasSubstr("centimetres"), HasSubstr("Multiply"),
+                                           HasSubstr("--unexamined"), testing::Not(HasSubstr("iteration"))));
   EXPECT_TRUE(spoilt.at("parameters").empty());
   EXPECT_FALSE(std::filesystem::exists(phantom_.file("gel.fit.json")));
 }
@@ -146,7 +146,7 @@ TEST_F(HostileData, MillimetresOfMercuryAreRefusedBeforeTheFit) {
   const auto spoilt = fit();
   EXPECT_EQ(code_, ExitCode::negative);
   EXPECT_THAT(ids(spoilt), Contains("pressure-unit"));
-  EXPECT_THAT(told_, HasSubstr("mmHg"));
+  EXPECT_THAT(stderr_text_, HasSubstr("mmHg"));
 }
 
 TEST_F(HostileData, AFrameThatWasNotLoadedIsToldAndRefusedWhereItMoved) {
@@ -166,7 +166,7 @@ TEST_F(HostileData, AnOffsetOfThePressuresIsToldAndFoundByTheFit) {
   EXPECT_EQ(code_, ExitCode::negative);  // on its bound
   EXPECT_EQ(spoilt.at("parameters").at("C1_kPa").at("at_bound"), "upper");
   EXPECT_THAT(ids(spoilt), Contains("pressure-offset"));
-  EXPECT_THAT(told_, HasSubstr("`diastole fit --pressure-offset "));
+  EXPECT_THAT(stderr_text_, HasSubstr("`diastole fit --pressure-offset "));
   EXPECT_GT(stiffness_kPa(spoilt), 1.15 * sound_kPa);
   const auto sought = fit({"--pressure-offset", "2", "--unexamined"});
   EXPECT_NEAR(sought.at("pressure_offset_kPa").at("value").get<double>(), offset_kPa, 0.35);
@@ -184,7 +184,7 @@ TEST_F(HostileData, AStartFarTooSoftIsStiffenedOrToldWithARemedy) {
     testing::internal::CaptureStderr();
     const test::Outcome outcome = test::run_command(
         {"fit", phantom_.file("soft.study.toml"), "--mesh", "4,2,1", "--json", "--unexamined"});
-    told_ = testing::internal::GetCapturedStderr();
+    stderr_text_ = testing::internal::GetCapturedStderr();
     code_ = outcome.code;
     return nlohmann::json::parse(outcome.output);
   };

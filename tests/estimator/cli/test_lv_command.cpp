@@ -26,19 +26,19 @@ TEST(LvCommand, MakesAMeshThatAStudySolves) {
   const VentriclePhantom ventricle = VentriclePhantom::random(5);
   const std::string guide = folder.write("ventricle.guide.csv", guide_of(ventricle)).string();
   const auto in_folder = [&](const char* name) { return (folder.path() / name).string(); };
-  const nlohmann::json told = nlohmann::json::parse(
+  const nlohmann::json reported = nlohmann::json::parse(
       test::run_command({"lv", guide, "-o", in_folder("ventricle.mesh"), "--mesh", "6,3,1", "--fibre-deg",
                          "60,-60", "--volumes", in_folder("volumes.csv"), "--surface",
                          in_folder("surface.csv"), "--page", in_folder("ventricle.html"), "--json"})
           .output);
-  EXPECT_EQ(told["elements"], 18);
-  EXPECT_EQ(told["node_sigma_mm"].size(), 48U);
-  EXPECT_EQ(told["phases"].size(), 3U);
-  EXPECT_EQ(told["largest_phase"], 0);
-  EXPECT_GT(told["least_jacobian"].get<double>(), 0.5);
-  const double cavity_mL = told["cavity_mL"].get<double>();
+  EXPECT_EQ(reported["elements"], 18);
+  EXPECT_EQ(reported["node_sigma_mm"].size(), 48U);
+  EXPECT_EQ(reported["phases"].size(), 3U);
+  EXPECT_EQ(reported["largest_phase"], 0);
+  EXPECT_GT(reported["least_jacobian"].get<double>(), 0.5);
+  const double cavity_mL = reported["cavity_mL"].get<double>();
   EXPECT_NEAR(cavity_mL, ventricle.cavity_mL(0), 0.03 * ventricle.cavity_mL(0));
-  for (const auto& shift : told["slice_shifts_mm"])
+  for (const auto& shift : reported["slice_shifts_mm"])
     EXPECT_EQ(shift["reference"].get<bool>(), shift["slice"].get<std::string>().starts_with("la"));
   EXPECT_THAT(read_whole_file(in_folder("volumes.csv")), testing::StartsWith("phase,cavity_volume_mL,"));
   EXPECT_THAT(read_whole_file(in_folder("surface.csv")),

@@ -35,10 +35,10 @@ TEST(MeshCommand, ExportsAStudysSpecimenAsTheVeryBody) {
   const test::ScratchFolder folder;
   const std::string built_in = folder.write("heart.study.toml", study_with(heart)).string();
   const std::string mesh = (folder.path() / "heart.mesh.toml").string();
-  const auto told =
+  const auto reported =
       nlohmann::json::parse(test::run_command({"mesh", "export", built_in, "-o", mesh, "--json"}).output);
-  EXPECT_EQ(told["elements"], 8);
-  EXPECT_EQ(told["fibres"], true);
+  EXPECT_EQ(reported["elements"], 8);
+  EXPECT_EQ(reported["fibres"], true);
   const std::string from_file =
       folder.write("file.study.toml", study_with("kind = \"mesh\"\nfile = \"heart.mesh.toml\"\n")).string();
   const auto expected = solved(built_in);

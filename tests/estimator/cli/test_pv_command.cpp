@@ -38,10 +38,10 @@ class PvCommand : public testing::Test {
   test::Outcome run(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), {"pv", study_.string()});
     testing::internal::CaptureStderr();
-    struct Told {
+    struct CapturedStderr {
       std::string& text;
-      ~Told() { text = testing::internal::GetCapturedStderr(); }
-    } const told{progress_};
+      ~CapturedStderr() { text = testing::internal::GetCapturedStderr(); }
+    } const captured{progress_};
     return test::run_command(std::move(arguments));
   }
 

@@ -19,10 +19,10 @@ class ReconstructCommand : public testing::Test {
     std::vector<std::string> arguments{"reconstruct", phantom_.study(), "--mesh", "4,2,1", "--no-stiffness"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     testing::internal::CaptureStderr();
-    struct Told {
+    struct CapturedStderr {
       std::string& text;
-      ~Told() { text = testing::internal::GetCapturedStderr(); }
-    } const told{told_};
+      ~CapturedStderr() { text = testing::internal::GetCapturedStderr(); }
+    } const captured{stderr_text_};
     return test::run_command(arguments);
   }
 
@@ -31,7 +31,7 @@ class ReconstructCommand : public testing::Test {
   }
 
   ThinnedPhantom phantom_;
-  std::string told_;
+  std::string stderr_text_;
 };
 
 TEST_F(ReconstructCommand, TellsAndWritesAllThatItIsAskedFor) {

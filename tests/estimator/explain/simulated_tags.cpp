@@ -164,10 +164,10 @@ class Camera {
 
   void take(int frame, const NodeField& seen_mm, std::vector<TagPoint>& tags) {
     const PointLocator deformed(motion_.mesh, seen_mm);
-    for (size_t taken = 0; taken < wanted_.tags;) {
+    for (size_t accepted = 0; accepted < wanted_.tags;) {
       if (auto tag = one(frame, deformed)) {
         tags.push_back(*tag);
-        ++taken;
+        ++accepted;
       }
     }
   }

@@ -94,10 +94,11 @@ Explanation explained_inclusion() {
     const double radius = 22.5 + 27.5 * ((k * 0.7548776662) - std::floor(k * 0.7548776662));
     const double z = 85.0 * ((k * 0.5698402910) - std::floor(k * 0.5698402910)) - 42.5;
     const double turn = std::remainder(theta - pi / 3, 2 * pi);
-    const double lump = 4.0 * std::exp(-turn * turn / 0.12 - (z - 10) * (z - 10) / 200 - (radius - 28) / 15);
+    const double inclusion =
+        4.0 * std::exp(-turn * turn / 0.12 - (z - 10) * (z - 10) / 200 - (radius - 28) / 15);
     const double after = noise(random);
     explain::FieldResidual seen{
-        {radius * std::cos(theta), radius * std::sin(theta), z}, 1 + k % 5, after + lump, after, {}};
+        {radius * std::cos(theta), radius * std::sin(theta), z}, 1 + k % 5, after + inclusion, after, {}};
     seen.per_mm[static_cast<size_t>(k % 3)] = 1.2;
     e.field.push_back(seen);
   }

@@ -31,7 +31,7 @@ FieldModel fibrous(double k1_kPa, double angle_deg) {
   return model;
 }
 
-FieldModel lumpy() {
+FieldModel with_inclusion() {
   FieldModel model;
   model.inclusion = Inclusion{.contrast = 0.35,
                               .radius_mm = 35.0,
@@ -79,7 +79,7 @@ std::vector<Hidden> hidden() {
        {.truth = fibrous(4.0, 105.0), .C1_kPa = 6.3, .highest_kPa = 2.1, .seed = 110},
        Verdict::named,
        {"fibre-anisotropy"}},
-      {"Lump", {.truth = lumpy(), .seed = 111}, Verdict::named, {"stiff-inclusion"}},
+      {"Inclusion", {.truth = with_inclusion(), .seed = 111}, Verdict::named, {"stiff-inclusion"}},
       {"SlipAndStiffening",
        {.truth = stiffening_and_slipping(), .C1_kPa = 7.2, .highest_kPa = 2.7, .seed = 112},
        Verdict::named,

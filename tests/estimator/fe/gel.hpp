@@ -28,7 +28,7 @@ inline ElasticModel gel(double c1_kPa, std::array<size_t, 3> elements = {8, 4, 1
 }
 
 /// So many times as stiff within 10 mm of a place in the wall, with an edge of some millimetres.
-inline StiffnessField lump(double contrast) {
+inline StiffnessField inclusion(double contrast) {
   return [=](const Eigen::Vector3d& X_mm) {
     const double distance_mm = (X_mm - Eigen::Vector3d(10.0, 35.0, 8.0)).norm();
     return 1.0 + 0.5 * (contrast - 1.0) * (1.0 - std::tanh((distance_mm - 10.0) / 2.0));

@@ -27,7 +27,7 @@ class Equations : public testing::TestWithParam<const Law*> {
     for (const LawParameter& parameter : GetParam()->parameters())
       values.push_back(parameter.typical);
     model_.emplace(make_annulus(gel_shape({5, 3, 2})), *GetParam(),
-                   ElasticOptions{.parameters = values, .stiffness = lump(4.0)});
+                   ElasticOptions{.parameters = values, .stiffness = inclusion(4.0)});
     state_ = shaken(model_->system(), model_->rest_state(), 0.4, 5);
     state_.pressure_kPa = 3.0;
   }

@@ -247,8 +247,8 @@ TEST(Failure, ALoadBeyondTheLimitEndsWithTheLastEquilibriumAndTheHistory) {
 // An inclusion in one element through the wall: while the pressure had to follow its stiffness, what a point moves was off by more than it moves.
 TEST(UnevenStiffness, BendsACoarseMeshAsItBendsAFineOne) {
   for (const double contrast : {0.3, 4.0}) {
-    ElasticModel coarse = gel(6.5, {8, 4, 1}, {.stiffness = lump(contrast)});
-    ElasticModel fine = gel(6.5, {14, 7, 3}, {.stiffness = lump(contrast)});
+    ElasticModel coarse = gel(6.5, {8, 4, 1}, {.stiffness = inclusion(contrast)});
+    ElasticModel fine = gel(6.5, {14, 7, 3}, {.stiffness = inclusion(contrast)});
     const Solution on_coarse = coarse.solve(4.0), on_fine = fine.solve(4.0);
     ASSERT_TRUE(on_coarse.report.converged());
     ASSERT_TRUE(on_fine.report.converged());

@@ -57,26 +57,26 @@ TEST(DamagedImages, APhaseThatIsBlankOrAnotherOnesIsLeftOut) {
   const RingScan scan{.phases = 12};
   const auto files = write_ring(scan, scratch.path());
   const Pixels right = pixels_of(files[3]);
-  const auto told = [&](const Pixels& wrong, size_t left = 11) {
+  const auto reported = [&](const Pixels& wrong, size_t left = 11) {
     rewrite(files[3], wrong);
     const ImageFolder folder = read_image_folder(scratch.path());
     EXPECT_EQ(folder.series.at(0).slices.at(0).images.size(), left);
     EXPECT_NO_THROW(require_sound(folder));  // it is tracked across the gap
     return finding_ids(folder);
   };
-  EXPECT_THAT(told(Pixels(right.size(), 0)), ElementsAre("phase-unlike"));
+  EXPECT_THAT(reported(Pixels(right.size(), 0)), ElementsAre("phase-unlike"));
   Pixels moved = right;
   std::rotate(moved.begin(), moved.begin() + 3, moved.end());  // by three pixels
-  EXPECT_THAT(told(moved), ElementsAre("phase-unlike"));
+  EXPECT_THAT(reported(moved), ElementsAre("phase-unlike"));
   // Which of the two it is nobody knows.
-  EXPECT_THAT(told(pixels_of(files[2]), 10), ElementsAre("phase-copied", "phase-copied"));
+  EXPECT_THAT(reported(pixels_of(files[2]), 10), ElementsAre("phase-copied", "phase-copied"));
 }
 
 TEST(DamagedImages, TimesThatAreExchangedOrRunBackwardsAreRefused) {
   const ScratchFolder scratch;
   const RingScan scan{.phases = 16, .most_mm2 = 250};
   const auto files = write_ring(scan, scratch.path());
-  const auto told = [&](auto time_ms) {
+  const auto reported = [&](auto time_ms) {
     for (int phase = 1; phase <= scan.phases; ++phase) {
       const fs::path& path = files[static_cast<size_t>(phase) - 1];
       rewrite(path, pixels_of(path), [&](DcmDataset& data) {
@@ -85,11 +85,11 @@ TEST(DamagedImages, TimesThatAreExchangedOrRunBackwardsAreRefused) {
     }
     return test::message_of([&] { require_sound(read_image_folder(scratch.path())); });
   };
-  EXPECT_THAT(told([&](int phase) {
+  EXPECT_THAT(reported([&](int phase) {
                 return scan.time_ms(phase == 4 ? 7 : phase == 7 ? 4 : phase);
               }),
               HasSubstr("the images at 228 and 444 ms seem to have each other's time"));
-  EXPECT_THAT(told([&](int phase) { return scan.time_ms(scan.phases + 1 - phase); }),
+  EXPECT_THAT(reported([&](int phase) { return scan.time_ms(scan.phases + 1 - phase); }),
               HasSubstr("the order of time is wrong"));
 }
 
@@ -254,21 +254,21 @@ TEST(DamagedImages, ARunLengthThatEndsEarlyOrLateIsRefused) {
   Uint8* bytes = nullptr;
   ASSERT_TRUE(fragment->getUint8Array(bytes).good());
   const std::vector<Uint8> whole(bytes, bytes + fragment->getLength());
-  const auto told = [&](const std::vector<Uint8>& changed) {
+  const auto reported = [&](const std::vector<Uint8>& changed) {
     EXPECT_TRUE(
         fragment->putUint8Array(changed.data(), static_cast<unsigned long>(changed.size() / 2 * 2)).good());
     EXPECT_TRUE(file.saveFile(files[2].c_str(), EXS_RLELossless).good());
     return finding_ids(read_image_folder(scratch.path()));
   };
-  EXPECT_THAT(told(whole), IsEmpty());
-  EXPECT_THAT(told({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(whole.size() / 2)}),
+  EXPECT_THAT(reported(whole), IsEmpty());
+  EXPECT_THAT(reported({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(whole.size() / 2)}),
               ElementsAre("damaged-pixels"));
   std::vector<Uint8> blank = whole;
   std::fill(blank.begin() + static_cast<std::ptrdiff_t>(blank.size() / 2), blank.end(), Uint8{0});
-  EXPECT_THAT(told(blank), ElementsAre("damaged-pixels"));
+  EXPECT_THAT(reported(blank), ElementsAre("damaged-pixels"));
   std::vector<Uint8> longer = whole;
   longer.insert(longer.end(), {3, 1, 2, 3, 4, 5});
-  EXPECT_THAT(told(longer), ElementsAre("damaged-pixels"));
+  EXPECT_THAT(reported(longer), ElementsAre("damaged-pixels"));
   EXPECT_THAT(test::message_of([&] { require_sound(read_image_folder(scratch.path())); }),
               HasSubstr("frame 1: the pixels cannot be decoded (RLE Lossless)"));
 }

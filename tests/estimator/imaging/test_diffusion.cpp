@@ -158,9 +158,9 @@ TEST(Diffusion, TensorsAreDipys) {
       fmt::format("/usr/bin/python3 {}/tests/estimator/imaging/dipy_tensors.py {} {}/tensors.csv > {} 2>&1",
                   DIASTOLE_SOURCE_DIR, folder.path().string(), folder.path().string(), out)
           .c_str());
-  std::ifstream told(out);
+  std::ifstream input(out);
   std::stringstream text;
-  text << told.rdbuf();
+  text << input.rdbuf();
   if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "python3-dipy is not installed: " << text.str();
   ASSERT_EQ(WEXITSTATUS(status), 0) << text.str();
   double largest = 1;

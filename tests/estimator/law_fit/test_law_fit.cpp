@@ -179,7 +179,7 @@ TEST(LawComparison, PrefersTheLawThatPredictsOtherKindsOfTests) {
   EXPECT_LT(best.predicted_percent, 3);
   for (const ComparedLaw& other : comparison.laws) {
     if (&other == &best) continue;
-    EXPECT_TRUE(other.told_apart);
+    EXPECT_TRUE(other.distinguished);
     EXPECT_GT(other.predicted_percent, 3 * best.predicted_percent) << other.fit.law->name();
   }
 }

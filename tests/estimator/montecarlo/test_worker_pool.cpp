@@ -49,7 +49,7 @@ TEST(ForkedPool, TakesLongResultsAndFewJobs) {
 }
 
 TEST(ForkedPool, AWorkerThatDiesIsAnErrorWithItsJobAndKeepsWhatCame) {
-  size_t taken = 0;
+  size_t received = 0;
   try {
     run_forked(
         jobs(10), 2,
@@ -57,12 +57,12 @@ TEST(ForkedPool, AWorkerThatDiesIsAnErrorWithItsJobAndKeepsWhatCame) {
           if (job == 105) ::raise(SIGKILL);
           return std::string("done");
         },
-        [&](size_t, const std::string&) { ++taken; });
+        [&](size_t, const std::string&) { ++received; });
     FAIL() << "no error";
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), testing::HasSubstr("job 105"));
   }
-  EXPECT_GE(taken, 4U);
+  EXPECT_GE(received, 4U);
 }
 
 }  // namespace

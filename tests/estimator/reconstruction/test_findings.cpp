@@ -106,11 +106,11 @@ TEST_F(Findings, ABodyThatSwells) {
     swollen.points.push_back(
         {frame, X, {by * X[0] + noise(random), by * X[1] + noise(random), by * X[2] + noise(random)}, 0.3});
   }
-  const std::vector<Finding> told = in_motion(swollen);
-  const auto grown = std::ranges::find_if(told, [](const Finding& finding) {
+  const std::vector<Finding> reported = in_motion(swollen);
+  const auto grown = std::ranges::find_if(reported, [](const Finding& finding) {
     return finding.id == "volume" && finding.where.find("frame 4") != std::string::npos;
   });
-  ASSERT_NE(grown, told.end()) << words(told);
+  ASSERT_NE(grown, reported.end()) << words(reported);
   EXPECT_NEAR(grown->number, 9.3, 1.0);
 }
 

@@ -152,7 +152,7 @@ TEST(LogarithmicAxis, TicksAtDecadesAndTheirParts) {
   EXPECT_THAT(plot.svg(), Not(HasSubstr("inf")));
 }
 
-TEST(ExplanationReport, TellsTheWholeStory) {
+TEST(ExplanationReport, ReportsEveryPartOfAnExplanation) {
   const test::ScratchFolder folder;
   const auto file = folder.write("explanation.json", to_json(test::explained_hose()));
   const std::string page = make_report(std::vector{file});

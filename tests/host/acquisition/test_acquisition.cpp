@@ -108,9 +108,9 @@ TEST(Acquisition, SamplesBeyondTheInstrumentsRangeAreToldAtOnceAndCounted) {
   EXPECT_LE(saturated, at_the_end);
   EXPECT_GT(saturated, at_the_end - signal::SaturationWatch::kLeastRun) << "all but where the recording ends";
   EXPECT_EQ(runfile::assess(run).saturated.at("cavity_kPa"), saturated);
-  const auto told = std::ranges::find(session.remarks, "saturated", &RunRemark::code);
-  ASSERT_NE(told, session.remarks.end());
-  EXPECT_EQ(told->level, "warning");
+  const auto reported = std::ranges::find(session.remarks, "saturated", &RunRemark::code);
+  ASSERT_NE(reported, session.remarks.end());
+  EXPECT_EQ(reported->level, "warning");
   EXPECT_THAT(session.remarks.back().text,
               testing::HasSubstr(fmt::format("{} samples of cavity", saturated)));
 }
@@ -239,13 +239,13 @@ TEST(Acquisition, AnInstrumentTooSlowForTheRateDrownsNoEmergencyStop) {
   EXPECT_GT(assembled.run.gaps.size(), 40U) << "the file has every one of them";
   EXPECT_LE(session.remarks.size(), 8U);
   EXPECT_EQ(std::ranges::count(session.remarks, "estop", &RunRemark::code), 1);
-  uint64_t told = 0;
+  uint64_t reported = 0;
   for (const RunRemark& remark : session.remarks) {
     uint64_t gaps = 0, samples = 0;
-    if (std::sscanf(remark.text.c_str(), "%lu gap%*[s,] %lu", &gaps, &samples) == 2) told += samples;
-    if (std::sscanf(remark.text.c_str(), "the gap cost %lu", &samples) == 1) told += samples;
+    if (std::sscanf(remark.text.c_str(), "%lu gap%*[s,] %lu", &gaps, &samples) == 2) reported += samples;
+    if (std::sscanf(remark.text.c_str(), "the gap cost %lu", &samples) == 1) reported += samples;
   }
-  EXPECT_EQ(told, session.outcome.counts.missing);
+  EXPECT_EQ(reported, session.outcome.counts.missing);
 }
 
 TEST(Acquisition, ASlowAnswerIsNotBlamedOnTheHost) {
@@ -442,13 +442,13 @@ TEST_P(GateAgainstController, ADisagreementAtTheEndIsAnErrorInTheRunFile) {
   session.run();
   EXPECT_EQ(session.outcome.end, "completed");
   const RecordedRun run = session.assemble().run;
-  const auto told = [&run](const std::string& level) {
+  const auto reported = [&run](const std::string& level) {
     return std::count_if(run.events.begin(), run.events.end(), [&](const runfile::Event& event) {
       return event.level == level && event.code == "gate_count" && event.time_s > 1.8;
     });
   };
-  EXPECT_EQ(told("error"), GetParam() == 0 ? 0 : 1);
-  EXPECT_EQ(told("info"), GetParam() == 0 ? 1 : 0);
+  EXPECT_EQ(reported("error"), GetParam() == 0 ? 0 : 1);
+  EXPECT_EQ(reported("info"), GetParam() == 0 ? 1 : 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Acquisition, GateAgainstController, testing::Values(-1, 0, 1));

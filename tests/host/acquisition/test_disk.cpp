@@ -4,7 +4,7 @@
 
 #include <fstream>
 
-#include "host/acquisition/disk_room.hpp"
+#include "host/acquisition/disk_space.hpp"
 #include "host/journal/journal_store.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/reader.hpp"
@@ -19,22 +19,22 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using namespace std::chrono_literals;
 
-TEST(DiskRoom, TheEstimateHoldsTheRunAndIsNotFarAboveIt) {
+TEST(DiskSpace, TheEstimateHoldsTheRunAndIsNotFarAboveIt) {
   SessionOnDesk session(short_session);
   session.run();
   const double seconds = session.experiment.least_duration_s();
-  const uint64_t fixed = room_for({0, 300, 300, 1, 0}).journal_bytes;
-  const uint64_t journal = room_for({seconds, 300, 300, 1, 2}).journal_bytes - fixed;
+  const uint64_t fixed = required_space({0, 300, 300, 1, 0}).journal_bytes;
+  const uint64_t journal = required_space({seconds, 300, 300, 1, 2}).journal_bytes - fixed;
   const uint64_t written = std::filesystem::file_size(session.journal);
   EXPECT_GT(journal + fixed, written);
   EXPECT_LT(journal, 2 * written);
 }
 
-TEST(DiskRoom, ARunThatTheDiskCannotHoldIsRefusedWithBothFigures) {
+TEST(DiskSpace, ARunThatTheDiskCannotHoldIsRefusedWithBothFigures) {
   const Scratch scratch("room");
-  EXPECT_NO_THROW(check_room(scratch.path(), {10, 300, 300, 1, 10}));
+  EXPECT_NO_THROW(check_disk_space(scratch.path(), {10, 300, 300, 1, 10}));
   EXPECT_THAT(message_of<InputError>([&] {
-                check_room(scratch.path(), {1e12, 300, 300, 1, 10});
+                check_disk_space(scratch.path(), {1e12, 300, 300, 1, 10});
               }),
               AllOf(HasSubstr(scratch.path().string()), HasSubstr("free"), HasSubstr("needs about"),
                     HasSubstr("journal_dir")));
@@ -76,10 +76,10 @@ TEST(Acquisition, AFullDiskStopsThePumpUnderControlAndLeavesAReadableJournal) {
   SessionOnDesk session(short_session);
   size_t room = 12'000;
   session.write = [&](int file, const void* bytes, size_t size) {
-    const size_t taken = std::min(room, size);
-    room -= taken;
-    if (taken == 0) errno = ENOSPC;
-    return taken == 0 ? ssize_t{-1} : ::write(file, bytes, taken);
+    const size_t accepted = std::min(room, size);
+    room -= accepted;
+    if (accepted == 0) errno = ENOSPC;
+    return accepted == 0 ? ssize_t{-1} : ::write(file, bytes, accepted);
   };
   session.run();
   EXPECT_EQ(session.outcome.end, "journal_failed");

@@ -29,7 +29,7 @@ struct Books {
   uint64_t received = 0;
   uint64_t missing = 0;
   std::vector<std::string> reasons;
-  std::vector<std::string> troubles;
+  std::vector<std::string> faults;
   std::vector<InstrumentTime> times;
   std::vector<double> volts;  // received ones, one channel
 
@@ -48,7 +48,7 @@ struct Books {
       } else if (const auto* time = std::get_if<InstrumentTime>(&item)) {
         times.push_back(*time);
       } else {
-        troubles.push_back(std::get<Trouble>(item).text);
+        faults.push_back(std::get<InstrumentFault>(item).text);
       }
     }
   }
@@ -158,8 +158,8 @@ TEST(BlockSource, SilenceIsToldAndAtTheEndCounted) {
   run_until(source, clock, end_ns, books);
   EXPECT_EQ(books.received, 640U);
   EXPECT_EQ(books.received + books.missing, grid.due_by(end_ns));
-  ASSERT_EQ(books.troubles.size(), 1U);
-  EXPECT_THAT(books.troubles[0], testing::HasSubstr("no block came"));
+  ASSERT_EQ(books.faults.size(), 1U);
+  EXPECT_THAT(books.faults[0], testing::HasSubstr("no block came"));
 }
 
 TEST(BlockSource, AnInstrumentThatFailsIsStartedAnewAndItsIndicesGoOnByTime) {
@@ -180,7 +180,7 @@ TEST(BlockSource, AnInstrumentThatFailsIsStartedAnewAndItsIndicesGoOnByTime) {
   // Two seconds, up to a block before, and up to half a second until the next attempt.
   EXPECT_NEAR(static_cast<double>(books.missing), 2.35 * true_rate_Hz, 0.36 * true_rate_Hz);
   EXPECT_THAT(books.reasons, testing::ElementsAre("is gone"));
-  EXPECT_THAT(books.troubles, testing::ElementsAre("is gone"));
+  EXPECT_THAT(books.faults, testing::ElementsAre("is gone"));
 }
 
 /// Sleeps for real when it is told to stall.

@@ -47,9 +47,10 @@ TEST(AtRest, SamplesAreTakenWhileTheControllerHearsTheHost) {
   SessionOnDesk session(short_session);
   session.client.connect();
   const auto source = make_source(session.clock, session.instrument);
-  const auto taken = sample_at_rest(session.clock, session.client, *source, 1, 300, 2, [] { return false; });
-  ASSERT_EQ(taken.size(), 1U);
-  EXPECT_NEAR(static_cast<double>(taken[0].size()), 600, 2);
+  const auto samples =
+      sample_at_rest(session.clock, session.client, *source, 1, 300, 2, [] { return false; });
+  ASSERT_EQ(samples.size(), 1U);
+  EXPECT_NEAR(static_cast<double>(samples[0].size()), 600, 2);
   EXPECT_TRUE(session.client.connected());
 }
 

@@ -9,7 +9,7 @@
 
 namespace diastole::daq {
 
-/// Patience for a loaded machine.
+/// Timeout for a loaded machine.
 inline const OpenOptions patient{.address = {}, .least_timeout_ms = 60};
 
 using OpenPolled = std::function<std::unique_ptr<PolledInstrument>(const OpenOptions&)>;

@@ -33,9 +33,9 @@ PseudoTerminal::PseudoTerminal() {
   tcsetattr(near, TCSANOW, &settings);
 }
 
-std::vector<uint8_t> PseudoTerminal::receive(std::chrono::milliseconds patience) const {
+std::vector<uint8_t> PseudoTerminal::receive(std::chrono::milliseconds timeout) const {
   pollfd state{far_.get(), POLLIN, 0};
-  if (::poll(&state, 1, static_cast<int>(patience.count())) <= 0) return {};
+  if (::poll(&state, 1, static_cast<int>(timeout.count())) <= 0) return {};
   std::array<uint8_t, 512> block{};
   const ssize_t got = ::read(far_.get(), block.data(), block.size());
   return {block.begin(), block.begin() + std::max<ssize_t>(got, 0)};

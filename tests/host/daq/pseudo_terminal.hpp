@@ -18,7 +18,7 @@ class PseudoTerminal {
   /// What a program opens: "/dev/pts/7".
   [[nodiscard]] const std::string& path() const { return path_; }
   /// What arrived within the time; empty if nothing did.
-  [[nodiscard]] std::vector<uint8_t> receive(std::chrono::milliseconds patience) const;
+  [[nodiscard]] std::vector<uint8_t> receive(std::chrono::milliseconds timeout) const;
   void send(std::span<const uint8_t> bytes) const;
 
  private:

@@ -49,7 +49,7 @@ TEST(ModbusTcp, ADescribedRegisterMapIsScaled) {
 }
 
 TEST(ModbusTcp, ALateAnswerIsNeverTakenForTheNext) {
-  // Request 3 is answered after 150 ms, when the driver (60 ms of patience) has long given up.
+  // Request 3 is answered after 150 ms, when the driver (timeout 60 ms) has long given up.
   const ModbusServer server([](int request) { return request == 3 ? 150 : 0; });
   const auto instrument = configured(labjack(server.port()), two_inputs)(patient);
   std::vector<double> volts(2);

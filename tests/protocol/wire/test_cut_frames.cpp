@@ -58,7 +58,7 @@ ReliableLink open_link(Role role) {
 }
 
 /// Payloads of the messages that `link` takes from `bytes`.
-std::vector<Bytes> taken(ReliableLink& link, const Bytes& bytes) {
+std::vector<Bytes> payloads(ReliableLink& link, const Bytes& bytes) {
   std::vector<Bytes> found;
   for (const std::uint8_t byte : bytes)
     if (const auto received = link.receive(byte, 0))
@@ -75,12 +75,12 @@ TEST_P(CutFrames, APrefixIsNotTakenAndCostsAtMostTheNextFrame) {
     for (std::size_t cut = 0; cut < whole.size(); ++cut) {
       ReliableLink link = open_link(GetParam());
       const Bytes prefix(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(cut));
-      ASSERT_TRUE(taken(link, prefix).empty()) << message.name << " cut at " << cut;
+      ASSERT_TRUE(payloads(link, prefix).empty()) << message.name << " cut at " << cut;
       // The same frame twice: the first may grow together with what is left of the cut one.
       const Bytes next = frame(marker, FrameKind::sequenced, 0, 0);
-      std::size_t found = taken(link, next).size();
+      std::size_t found = payloads(link, next).size();
       ASSERT_GE(found, cut == 0 ? 1U : 0U) << message.name;
-      found += taken(link, next).size();
+      found += payloads(link, next).size();
       ASSERT_EQ(found, 1U) << message.name << " cut at " << cut;
       ASSERT_EQ(link.state(), ReliableLink::State::open);
     }
@@ -94,8 +94,8 @@ TEST_P(CutFrames, AFrameWithoutItsBeginningCostsNoOther) {
     for (std::size_t cut = 1; cut < whole.size(); ++cut) {
       ReliableLink link = open_link(GetParam());
       const Bytes rest(whole.begin() + static_cast<std::ptrdiff_t>(cut), whole.end());
-      ASSERT_TRUE(taken(link, rest).empty()) << message.name << " from " << cut;
-      ASSERT_EQ(taken(link, frame(marker, FrameKind::sequenced, 0, 0)).size(), 1U) << message.name;
+      ASSERT_TRUE(payloads(link, rest).empty()) << message.name << " from " << cut;
+      ASSERT_EQ(payloads(link, frame(marker, FrameKind::sequenced, 0, 0)).size(), 1U) << message.name;
     }
   }
 }

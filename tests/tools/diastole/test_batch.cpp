@@ -155,11 +155,11 @@ TEST_F(Batches, TheSlurmScriptRunsEachJobByItsNumber) {
   folder_.write("b.study.toml", "done");
   const fs::path place = folder_.path() / "it's here";
   fs::create_directory(place);
-  const fs::path door = place / "door";
-  std::ofstream(door) << "#!/bin/bash\necho \"$*\" >> \"$(dirname \"$0\")/called\"\n";
-  fs::permissions(door, fs::perms::owner_all);
+  const fs::path program = place / "program";
+  std::ofstream(program) << "#!/bin/bash\necho \"$*\" >> \"$(dirname \"$0\")/called\"\n";
+  fs::permissions(program, fs::perms::owner_all);
   const Batch jobs = batch("[[job]]\ncommand = \"fit\"\ninputs = [\"*.study.toml\"]\n");
-  const fs::path script = folder_.write("gels.sh", slurm_script(jobs, door.string()));
+  const fs::path script = folder_.write("gels.sh", slurm_script(jobs, program.string()));
   EXPECT_THAT(read_whole_file(script), HasSubstr("#SBATCH --array=1-2\n"));
   for (const char* task : {"1", "2"})
     EXPECT_EQ(std::system(fmt::format("SLURM_ARRAY_TASK_ID={} bash '{}'", task, script.string()).c_str()), 0);

@@ -26,7 +26,7 @@ struct HeldTriggers {
     return static_cast<int64_t>(rises_ns.at(1) - rises_ns.at(0)) - static_cast<int64_t>(period_ns);
   }
   /// Every rise at the pin is counted and reported once, with its own time.
-  [[nodiscard]] bool told() const {
+  [[nodiscard]] bool reported() const {
     if (!ended || counted != rises_ns.size() || triggers.size() != rises_ns.size()) return false;
     for (std::size_t i = 1; i < rises_ns.size(); ++i) {
       const double at_pin_ns = static_cast<double>(rises_ns[i] - rises_ns[0]);

@@ -10,7 +10,7 @@ namespace {
 using ::testing::HasSubstr;
 
 template <class Error>
-std::string told_by(FlashBench& bench, const std::string& file, const UpdateOptions& options = {}) {
+std::string output_of(FlashBench& bench, const std::string& file, const UpdateOptions& options = {}) {
   try {
     (void)bench.flash(file, options);
     return "";
@@ -49,7 +49,7 @@ TEST(Flashing, ReturnsToAnImageThatWasConfirmedLongAgo) {
   NEEDS_UPDATE_IMAGES();
   FlashBench bench;
   (void)bench.flash(newer_update);
-  EXPECT_THAT(told_by<InputError>(bench, first_update), HasSubstr("0.1.0 is older than 0.1.1"));
+  EXPECT_THAT(output_of<InputError>(bench, first_update), HasSubstr("0.1.0 is older than 0.1.1"));
   EXPECT_EQ(bench.runs(), "0.1.1 confirmed");
   const UpdateResult result = bench.flash(first_update, {.allow_older = true});
   EXPECT_LT(result.sent_bytes, 8U) << "slot A still holds it";
@@ -62,7 +62,7 @@ TEST(Flashing, ReturnsToAnImageThatWasConfirmedLongAgo) {
 TEST(Flashing, AnImageThatHangsGivesWayToTheConfirmedOne) {
   NEEDS_UPDATE_IMAGES();
   FlashBench bench;
-  EXPECT_THAT(told_by<HardwareError>(bench, hanging_update), HasSubstr("has returned to 0.1.0"));
+  EXPECT_THAT(output_of<HardwareError>(bench, hanging_update), HasSubstr("has returned to 0.1.0"));
   EXPECT_EQ(bench.runs(), "0.1.0 confirmed");
   EXPECT_EQ(bench.board().statistics().resets.back().cause, "software");
   EXPECT_EQ(bench.flash(newer_update).end, UpdateEnd::confirmed);
@@ -72,10 +72,10 @@ TEST(Flashing, AnImageThatNobodyConfirmsGivesWayByItself) {
   NEEDS_UPDATE_IMAGES();
   FlashBench bench;
   // The host's line is cut when the new image is about to start.
-  (void)told_by<HardwareError>(bench, newer_update, {.say = [&](const std::string& words) {
-                                 if (words.find("starting") != std::string::npos)
-                                   throw HardwareError("host", "gone", "");
-                               }});
+  (void)output_of<HardwareError>(bench, newer_update, {.say = [&](const std::string& words) {
+                                   if (words.find("starting") != std::string::npos)
+                                     throw HardwareError("host", "gone", "");
+                                 }});
   EXPECT_EQ(bench.runs(), "0.1.1 unconfirmed");
   bench.desk.sleep_until_ns(bench.desk.now_ns() + 21'000 * ms, nullptr);
   EXPECT_EQ(bench.runs(), "0.1.0 confirmed");

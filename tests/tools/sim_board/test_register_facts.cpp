@@ -90,24 +90,25 @@ TEST_F(Facts, BitsThatCanBeReadAndWrittenAreHeld) {
 }
 
 TEST_F(Facts, WhatTheManualForbidsIsTold) {
-  const auto told = [this](auto&& access) {
+  const auto reported = [this](auto&& access) {
     board_model::Notes& notes = chip.notes;
     const std::size_t before = notes.all().size();
     access(chip.bus);
     return notes.all().size() > before;
   };
-  EXPECT_TRUE(told([](auto& bus) { bus.write(rcc + 0x04, 0x0401'5008, 4); }))
+  EXPECT_TRUE(reported([](auto& bus) { bus.write(rcc + 0x04, 0x0401'5008, 4); }))
       << "PLLCFGR without its reserved bit";
-  EXPECT_TRUE(told([](auto& bus) { bus.write(0x4000'0010, 0xffff'fffe, 4); })) << "reserved flags of TIM2_SR";
-  EXPECT_TRUE(told([](auto& bus) { bus.write(0x4000'7408, 1, 2); })) << "half a word to the DAC";
-  EXPECT_TRUE(told([](auto& bus) { bus.write(0x4000'0034, 1, 1); })) << "a byte to a timer";
-  EXPECT_TRUE(told([](auto& bus) { (void)bus.read(0x4002'3c04, 4); })) << "FLASH_KEYR is written only";
-  EXPECT_TRUE(told([](auto& bus) { (void)bus.read(0x4000'7038, 4); })) << "PWR ends at CSR";
-  EXPECT_TRUE(told([](auto& bus) { bus.write(rcc + 0x40, 0, 4), bus.write(0x4000'0000, 1, 4); }))
+  EXPECT_TRUE(reported([](auto& bus) { bus.write(0x4000'0010, 0xffff'fffe, 4); }))
+      << "reserved flags of TIM2_SR";
+  EXPECT_TRUE(reported([](auto& bus) { bus.write(0x4000'7408, 1, 2); })) << "half a word to the DAC";
+  EXPECT_TRUE(reported([](auto& bus) { bus.write(0x4000'0034, 1, 1); })) << "a byte to a timer";
+  EXPECT_TRUE(reported([](auto& bus) { (void)bus.read(0x4002'3c04, 4); })) << "FLASH_KEYR is written only";
+  EXPECT_TRUE(reported([](auto& bus) { (void)bus.read(0x4000'7038, 4); })) << "PWR ends at CSR";
+  EXPECT_TRUE(reported([](auto& bus) { bus.write(rcc + 0x40, 0, 4), bus.write(0x4000'0000, 1, 4); }))
       << "no clock";
-  EXPECT_TRUE(told([](auto& bus) { bus.write(rcc + 0x40, 1, 4), bus.write(0x4000'0000, 1, 4); }))
+  EXPECT_TRUE(reported([](auto& bus) { bus.write(rcc + 0x40, 1, 4), bus.write(0x4000'0000, 1, 4); }))
       << "its clock has only just been enabled";
-  EXPECT_FALSE(told([](auto& bus) {
+  EXPECT_FALSE(reported([](auto& bus) {
     bus.write(rcc + 0x40, 0, 4), bus.write(rcc + 0x40, 1, 4);
     (void)bus.read(rcc + 0x40, 4);
     bus.write(0x4000'0000, 1, 4);

@@ -10,13 +10,13 @@ namespace {
 
 TEST(Carriage, VentsTheLineUntilHomingEnds) {
   Carriage carriage(0.01, ScriptedController({}).places());
-  std::vector<double> told_mL;
+  std::vector<double> reported_mL;
   for (const sim_controller::PinEdge& edge : home_and_inflate(100, 1000)) {
-    if (const auto displaced_mL = carriage.take(edge, 0)) told_mL.push_back(*displaced_mL);
+    if (const auto displaced_mL = carriage.take(edge, 0)) reported_mL.push_back(*displaced_mL);
   }
-  ASSERT_EQ(told_mL.size(), 101U);
-  EXPECT_DOUBLE_EQ(told_mL.front(), 0);
-  EXPECT_NEAR(told_mL.back(), 1.0, 1e-12);
+  ASSERT_EQ(reported_mL.size(), 101U);
+  EXPECT_DOUBLE_EQ(reported_mL.front(), 0);
+  EXPECT_NEAR(reported_mL.back(), 1.0, 1e-12);
 }
 
 TEST(Carriage, OnlyRisingStepEdgesMoveIt) {

@@ -43,7 +43,7 @@ TEST(FaultSchedule, AnythingElseIsRefusedWithTheForms) {
 
 /// The bytes by which the controller tells a message.
 template <class Message>
-std::vector<uint8_t> told(const Message& message) {
+std::vector<uint8_t> framed(const Message& message) {
   std::array<uint8_t, wire::kMaxPayloadBytes> payload{};
   std::array<uint8_t, wire::kMaxEncodedBytes> memory{};
   const wire::FrameHeader header{7, wire::FrameKind::sequenced, static_cast<uint8_t>(Message::kType), 0, 0};
@@ -57,11 +57,11 @@ TEST(RunClock, KnowsTheStartOfRunAheadAndThenToTheTick) {
   wire::StateChanged changed;
   changed.to = wire::State::running;
   changed.tick = 84'000'000;
-  clock.overhear(told(changed), 5'000);
+  clock.observe(framed(changed), 5'000);
   EXPECT_EQ(clock.run_start_ns(), 1'020'005'000U);
   wire::RunStarted started;
   started.tick = 84'000'000 + 20'000 * 84 + 1;
-  clock.overhear(told(started), 5'000);
+  clock.observe(framed(started), 5'000);
   EXPECT_EQ(clock.run_start_ns(), 1'020'005'012U) << "the first ns within the tick";
   EXPECT_EQ(clock.at_ns({Origin::run, 24}), 1'020'005'036U) << "three ticks later";
   EXPECT_FALSE(clock.at_ns({Origin::ttl, 0}));
@@ -71,12 +71,12 @@ TEST(RunClock, KnowsTheStartOfRunAheadAndThenToTheTick) {
   clock.trigger(3'000'000'000);
   EXPECT_EQ(clock.at_ns({Origin::ttl, 5}), 2'000'000'005U);
   changed.to = wire::State::homed;
-  clock.overhear(told(changed), 5'000);
+  clock.observe(framed(changed), 5'000);
   EXPECT_EQ(clock.run_start_ns(), 1'020'005'012U) << "of the latest run";
   EXPECT_EQ(clock.present_or_next_run(), 2U);
   changed.to = wire::State::running;
   changed.tick *= 2;
-  clock.overhear(told(changed), 5'000);
+  clock.observe(framed(changed), 5'000);
   EXPECT_EQ(clock.at_ns({Origin::run, 0, 2}), 2'020'005'000U);
   EXPECT_EQ(clock.at_ns({Origin::run, 0, 1}), 0U) << "long past";
 }

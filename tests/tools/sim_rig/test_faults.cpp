@@ -24,7 +24,7 @@ class Bench {
 
   Bench& set(std::string_view name, bool on) {
     const FaultKind& kind = fault_named(name);
-    RigInTrouble all{rig, instrument, cables};
+    FaultTarget all{rig, instrument, cables};
     kind.set(all, on ? std::optional(kind.usual) : std::nullopt);
     return *this;
   }
@@ -183,12 +183,12 @@ TEST(RigFaults, EveryFaultOfTheListLeavesItsTrace) {
 }
 
 TEST(RigFaults, EveryFaultIsTold) {
-  std::string told = "\n";
-  told += list_of_faults();
+  std::string listed = "\n";
+  listed += list_of_faults();
   for (const FaultKind& kind : fault_kinds()) {
     std::string line = "\n";
     line.append(kind.name).append(" ");
-    EXPECT_NE(told.find(line), std::string::npos) << kind.name;
+    EXPECT_NE(listed.find(line), std::string::npos) << kind.name;
     EXPECT_GE(kind.usual, kind.least) << kind.name;
     EXPECT_LE(kind.usual, kind.most) << kind.name;
   }

@@ -69,8 +69,9 @@ ChartSeries solve_and_print(const Mesh& mesh) {
       const double moved = radial_displacement_mm(model, locator, solution.state, radii_mm[i]);
       fmt::print(" {:+.3f} |", 100.0 * (moved / load.radial_mm[i] - 1.0));
     }
-    const double taken = model.cavity_volume_mL(solution.state) - model.cavity_volume_mL(model.rest_state());
-    fmt::print(" {:+.3f} | {} + {} | {:.2f} |\n", 100.0 * (taken / load.volume_change_mL - 1.0),
+    const double change_mL =
+        model.cavity_volume_mL(solution.state) - model.cavity_volume_mL(model.rest_state());
+    fmt::print(" {:+.3f} | {} + {} | {:.2f} |\n", 100.0 * (change_mL / load.volume_change_mL - 1.0),
                solution.report.factorisations,
                solution.report.newton_iterations - solution.report.factorisations, processor_s);
     std::fflush(stdout);

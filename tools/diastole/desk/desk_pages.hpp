@@ -1,5 +1,5 @@
 #pragma once
-// What stands behind the desk's door: a page with its scripts, what it asks for, and what a person does there.
+// What the desk serves: a page with its scripts, what it asks for, and what a person does there.
 
 #include <memory>
 #include <optional>

@@ -11,8 +11,8 @@
 #include <csignal>
 
 #include "estimator/report/cine.hpp"
+#include "host/web/access_policy.hpp"
 #include "host/web/console_stream.hpp"
-#include "host/web/door.hpp"
 #include "host/web/listen.hpp"
 #include "host/web/request.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -27,7 +27,7 @@ namespace http = beast::http;
 using asio::ip::tcp;
 using beast::error_code;
 
-constexpr std::chrono::seconds patience{10};
+constexpr std::chrono::seconds request_timeout{10};
 constexpr uint64_t most_body_bytes = 1 << 20;  // a choice of some ten thousand points
 constexpr size_t most_connections = 32;
 
@@ -47,7 +47,7 @@ Answer as_text(const DeskAnswer& answer) { return {answer.status, "text/plain; c
 /// What every desk's page has beside its own.
 std::span<const report::PageAsset> shared_assets() {
   static const std::array assets{
-      report::PageAsset{"/door.js", "text/javascript", embedded::door_js},
+      report::PageAsset{"/common.js", "text/javascript", embedded::common_js},
       report::PageAsset{"/desk.css", "text/css", embedded::desk_css},
       report::PageAsset{"/icon.svg", "image/svg+xml", web::find_page_file("/icon.svg")->text}};
   return assets;
@@ -56,22 +56,22 @@ std::span<const report::PageAsset> shared_assets() {
 /// What becomes of requests.
 class Desk {
  public:
-  Desk(DeskPages& pages, web::Door door) : pages_(pages), door_(std::move(door)) {}
+  Desk(DeskPages& pages, web::AccessPolicy policy) : pages_(pages), policy_(std::move(policy)) {}
 
-  [[nodiscard]] const web::Door& door() const { return door_; }
+  [[nodiscard]] const web::AccessPolicy& policy() const { return policy_; }
 
   Answer answer(const Request& request) {
     const auto origin = request.find(http::field::origin);
-    if (const auto refusal =
-            door_.check_place(view(request[http::field::host]),
-                              origin == request.end() ? std::nullopt : std::optional(view(origin->value()))))
+    if (const auto refusal = policy_.check_place(
+            view(request[http::field::host]),
+            origin == request.end() ? std::nullopt : std::optional(view(origin->value()))))
       return as_text(refused(refusal->status, refusal->sentence));
     const std::string_view all = view(request.target());
     const std::string_view path = all.substr(0, all.find('?'));
     const bool is_get = request.method() == http::verb::get;
     if (const report::PageAsset* asset = is_get ? find_asset(path) : nullptr)
       return {200, asset->type, std::make_shared<const std::string>(asset->text)};
-    if (door_.role_of(web::token_in(view(request[http::field::authorization]), {})) != ConsoleRole::control)
+    if (policy_.role_of(web::token_in(view(request[http::field::authorization]), {})) != ConsoleRole::control)
       return as_text(refused(
           401, "The token in this address is not valid: open the address that `diastole desk` printed."));
     std::optional<DeskAnswer> answer;
@@ -99,7 +99,7 @@ class Desk {
   }
 
   DeskPages& pages_;
-  web::Door door_;
+  web::AccessPolicy policy_;
 };
 
 class Connection : public std::enable_shared_from_this<Connection> {
@@ -116,7 +116,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
     parser_.emplace();
     parser_->header_limit(web::most_header_bytes);
     parser_->body_limit(most_body_bytes);
-    stream_.tcp().expires_after(patience);
+    stream_.tcp().expires_after(request_timeout);
     http::async_read(stream_, buffer_, *parser_, [self = shared_from_this()](error_code error, size_t) {
       if (!error) self->reply(self->desk_.answer(self->parser_->get()));
     });
@@ -132,7 +132,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
     response_.prepare_payload();
     // A slow line, such as a tunnel to another town, passes a hundred kilobytes in a second.
     constexpr size_t least_bytes_per_s = 100'000;
-    stream_.tcp().expires_after(patience + std::chrono::seconds(response_.body().size() / least_bytes_per_s));
+    stream_.tcp().expires_after(request_timeout +
+                                std::chrono::seconds(response_.body().size() / least_bytes_per_s));
     http::async_write(stream_, response_, [self = shared_from_this()](error_code error, size_t) {
       if (!error && self->response_.keep_alive()) self->read();
     });
@@ -150,7 +151,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
 struct DeskServer::Impl {
   Impl(DeskPages& pages, uint16_t port)
-      : desk(pages, web::Door({asio::ip::address_v4::loopback(), port}, "")), acceptor(context) {
+      : desk(pages, web::AccessPolicy({asio::ip::address_v4::loopback(), port}, "")), acceptor(context) {
     web::listen_at(acceptor, {asio::ip::address_v4::loopback(), port}, "desk", "--port");
   }
 
@@ -173,7 +174,7 @@ DeskServer::DeskServer(DeskPages& pages, uint16_t port) : impl_(std::make_unique
 DeskServer::~DeskServer() = default;
 
 std::string DeskServer::url() const {
-  return impl_->desk.door().url(ConsoleRole::control, impl_->acceptor.local_endpoint().port());
+  return impl_->desk.policy().url(ConsoleRole::control, impl_->acceptor.local_endpoint().port());
 }
 
 void DeskServer::run() {

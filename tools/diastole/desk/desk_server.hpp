@@ -1,10 +1,10 @@
 #pragma once
-// The desk's door: HTTP on this machine's loopback, for one person's browser.
+// The desk's endpoint: HTTP on this machine's loopback, for one person's browser.
 //
-//   GET /, /door.js, ...     the page; anybody on this machine may have it, it holds nothing
+//   GET /, /common.js, ...   the page; anybody on this machine may have it, it holds nothing
 //   with the token ("Authorization: Bearer TOKEN"): what the desk's pages answer (DeskPages); 422 with a sentence for what does not fit
 //
-// Host and Origin are checked first, as at the console (host/web/door.hpp).
+// Host and Origin are checked first, as at the console (host/web/access_policy.hpp).
 
 #include <cstdint>
 #include <memory>

@@ -6,7 +6,7 @@
 namespace diastole::desk::embedded {
 
 extern const std::string_view desk_css;
-extern const std::string_view door_js;
+extern const std::string_view common_js;
 extern const std::string_view tags_html;
 extern const std::string_view tags_js;
 extern const std::string_view guide_html;

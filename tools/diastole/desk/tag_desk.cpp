@@ -49,8 +49,8 @@ TagDesk::TagDesk(const imaging::ImageFolder& folder, imaging::TrackRequest reque
     : request_(std::move(request)), tags_(std::move(tags)) {
   imaging::require_sound(folder);
   folder_problems_ = folder.problems;
-  std::vector<Finding> told_later;
-  (void)imaging::stated_pose(request_, told_later);  // a broken one is refused before anything is tracked
+  std::vector<Finding> reported_later;
+  (void)imaging::stated_pose(request_, reported_later);  // a broken one is refused before anything is tracked
   views_ = imaging::tag_views(folder);
   edits_ = imaging::parse_edits(file_text(), edits_file());
   imaging::apply_edits(edits_, views_);

@@ -15,7 +15,7 @@ using runfile::RunFile;
 using runfile::Series;
 
 constexpr double shortest_s = 1e-3;  ///< after the start of run
-constexpr double silence_patience_s = 1;
+constexpr double silence_timeout_s = 1;
 constexpr const char* was_reset = "was reset";
 constexpr double reboot_s = 5e-3;
 constexpr double before_noticed_s =
@@ -47,7 +47,7 @@ void plan_link_loss(const RunFile& file, const Event& event, double onset_shift_
         "when and why the controller was reset is not in the file: its supply is cut after what was last "
         "heard of it, such that the host notices when it did");
   } else if (says("fallen silent")) {
-    plan.faults.push_back(fault_from("serial-silence", event.time_s - silence_patience_s));
+    plan.faults.push_back(fault_from("serial-silence", event.time_s - silence_timeout_s));
   } else {
     plan.faults.push_back(fault_from("serial-hangup", event.time_s));
   }

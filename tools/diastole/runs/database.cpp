@@ -8,7 +8,7 @@ namespace diastole::catalogue {
 namespace {
 
 /// For another process that is writing the same index.
-constexpr int patience_ms = 60'000;
+constexpr int lock_timeout_ms = 60'000;
 
 }  // namespace
 
@@ -18,7 +18,7 @@ Database::Database(const std::filesystem::path& file) {
     sqlite3_close(handle_);
     throw DatabaseError(problem);
   }
-  sqlite3_busy_timeout(handle_, patience_ms);
+  sqlite3_busy_timeout(handle_, lock_timeout_ms);
 }
 
 void Database::execute(const std::string& sql) {

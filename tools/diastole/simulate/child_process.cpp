@@ -74,8 +74,8 @@ ChildProcess::ChildProcess(const std::vector<std::string>& arguments, std::files
   }
 }
 
-std::string ChildProcess::first_line(std::chrono::milliseconds patience) {
-  const auto give_up = SteadyClock::now() + patience;
+std::string ChildProcess::first_line(std::chrono::milliseconds timeout) {
+  const auto give_up = SteadyClock::now() + timeout;
   std::string line;
   while (SteadyClock::now() < give_up) {
     pollfd readable{output_, POLLIN, 0};
@@ -92,10 +92,10 @@ std::string ChildProcess::first_line(std::chrono::milliseconds patience) {
 
 bool ChildProcess::running() { return pid_ > 0 && !reap(std::chrono::milliseconds(0)); }
 
-int ChildProcess::stop(std::chrono::milliseconds patience) {
+int ChildProcess::stop(std::chrono::milliseconds timeout) {
   if (pid_ > 0 && !reap(std::chrono::milliseconds(0))) {
     ::kill(pid_, SIGTERM);
-    if (!reap(patience)) {
+    if (!reap(timeout)) {
       ::kill(pid_, SIGKILL);
       reap(std::chrono::seconds(10));
     }
@@ -105,8 +105,8 @@ int ChildProcess::stop(std::chrono::milliseconds patience) {
   return exit_code_.value_or(128 + SIGKILL);
 }
 
-bool ChildProcess::reap(std::chrono::milliseconds patience) {
-  const auto give_up = SteadyClock::now() + patience;
+bool ChildProcess::reap(std::chrono::milliseconds timeout) {
+  const auto give_up = SteadyClock::now() + timeout;
   while (!exit_code_) {
     int status = 0;
     if (::waitpid(pid_, &status, WNOHANG) == pid_) {

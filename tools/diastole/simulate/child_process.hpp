@@ -22,20 +22,20 @@ class ChildProcess {
   ChildProcess& operator=(const ChildProcess&) = delete;
 
   /// The first line of its standard output, without the line's end. Throws HardwareError, with what it said
-  /// on standard error, when it ends or `patience` passes before.
-  std::string first_line(std::chrono::milliseconds patience);
+  /// on standard error, when it ends or `timeout` passes before.
+  std::string first_line(std::chrono::milliseconds timeout);
 
   [[nodiscard]] bool running();
   [[nodiscard]] pid_t pid() const { return pid_; }
-  /// Asks it to end (SIGTERM) and waits; after `patience` ends it (SIGKILL). Returns its exit code, or 128
+  /// Asks it to end (SIGTERM) and waits; after `timeout` ends it (SIGKILL). Returns its exit code, or 128
   /// plus the signal that ended it.
-  int stop(std::chrono::milliseconds patience);
+  int stop(std::chrono::milliseconds timeout);
 
   /// What it has written to its log so far.
   [[nodiscard]] std::string said() const;
 
  private:
-  bool reap(std::chrono::milliseconds patience);
+  bool reap(std::chrono::milliseconds timeout);
 
   std::string name_;
   std::filesystem::path log_;

@@ -16,8 +16,8 @@ namespace {
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 
-constexpr auto start_patience = 30s;
-constexpr auto stop_patience = 20s;
+constexpr auto start_timeout = 30s;
+constexpr auto stop_timeout = 20s;
 
 std::string program_beside(const std::string& name) {
   return fs::read_symlink("/proc/self/exe").parent_path() / name;
@@ -60,7 +60,7 @@ SimulatedRig::SimulatedRig(const PrivateDirectory& directory, const SimulatedRig
   if (!options.real_time) rig.insert(rig.end(), {"--conductor", conductor});
   rig.insert(rig.end(), options.more.begin(), options.more.end());
   rig_ = std::make_unique<ChildProcess>(rig, directory / "sim_rig.log");
-  const auto addresses = nlohmann::json::parse(rig_->first_line(start_patience));
+  const auto addresses = nlohmann::json::parse(rig_->first_line(start_timeout));
 
   const std::string daq = fmt::format("{}:{}", addresses.at("modbus_host").get<std::string>(),
                                       addresses.at("modbus_port").get<int>());
@@ -69,12 +69,12 @@ SimulatedRig::SimulatedRig(const PrivateDirectory& directory, const SimulatedRig
   daemon.insert(daemon.end(), {"--journal-dir", directory / "journals"});
   if (!options.real_time) daemon.insert(daemon.end(), {"--conductor", conductor});
   daemon_ = std::make_unique<ChildProcess>(daemon, directory / "daemon.log");
-  daemon_->first_line(start_patience);
+  daemon_->first_line(start_timeout);
 }
 
 void SimulatedRig::stop() {
-  daemon_->stop(stop_patience);
-  if (const int code = rig_->stop(stop_patience); code != 0) {
+  daemon_->stop(stop_timeout);
+  if (const int code = rig_->stop(stop_timeout); code != 0) {
     throw HardwareError("sim_rig", fmt::format("ended with code {}: {}", code, rig_->said()),
                         "Check the room where the pin trace is written.");
   }

@@ -6,9 +6,9 @@
 // cut hits is left half done: a word keeps every second bit that should have fallen, an erase clears the
 // first half.
 //
-// Cells that were written below 2.7 V (32 bits at a time need that much), and with doubt_cells() those of an operation that
+// Cells that were written below 2.7 V (32 bits at a time need that much), and with randomise_cut_cells() those of an operation that
 // the power cut hit, are marginal: each power-up reads them anew, a one or a zero, until the sector is erased or the word
-// written as it should be. With doubt_cells() an arbitrary part of a word's bits has fallen, and an erase may leave its
+// written as it should be. With randomise_cut_cells() an arbitrary part of a word's bits has fallen, and an erase may leave its
 // sector reading blank. Option bytes (OPTCR) are kept as flash is, and count from the next reset on.
 
 #include <algorithm>
@@ -124,8 +124,8 @@ class Flash final : public RegisterBlock {
 
   /// The voltage that operations have, and what a power cut leaves drawn from `seed`.
   void set_supply_mV(uint32_t supply_mV) { supply_mV_ = supply_mV; }
-  void doubt_cells(uint32_t seed) {
-    doubting_ = true;
+  void randomise_cut_cells(uint32_t seed) {
+    randomised_ = true;
     random_.seed(seed);
   }
   /// Power-up: marginal cells read anew.
@@ -267,13 +267,14 @@ class Flash final : public RegisterBlock {
     if (bytes <= 4) {
       const uint32_t old = word_of(before_.data(), bytes);
       const uint32_t falling = old & ~word_of(&memory_[before_at_], bytes);
-      const uint32_t left = old & ~(falling & (doubting_ ? static_cast<uint32_t>(random_()) : 0x5555'5555U));
+      const uint32_t left =
+          old & ~(falling & (randomised_ ? static_cast<uint32_t>(random_()) : 0x5555'5555U));
       std::memcpy(&memory_[before_at_], &left, bytes);
-      if (doubting_) marginal_[before_at_] |= falling;
+      if (randomised_) marginal_[before_at_] |= falling;
     } else {
-      const uint32_t done = doubting_ && random_() % 2 == 0 ? bytes : bytes / 2;
+      const uint32_t done = randomised_ && random_() % 2 == 0 ? bytes : bytes / 2;
       std::copy(before_.begin() + done, before_.end(), memory_.begin() + before_at_ + done);
-      if (doubting_) weaken(before_at_, bytes);
+      if (randomised_) weaken(before_at_, bytes);
     }
     changed(before_at_, bytes);
     busy_ = false;
@@ -310,7 +311,7 @@ class Flash final : public RegisterBlock {
   uint32_t loaded_options_ = 0x0fff'aaec;  ///< as they were at the last reset
   uint32_t supply_mV_ = 3300;
   std::map<uint32_t, uint32_t> marginal_;  ///< bits by the offset of their word
-  bool doubting_ = false, first_option_key_ = false;
+  bool randomised_ = false, first_option_key_ = false;
   std::mt19937 random_{405};
   bool first_key_ = false, key_fault_ = false;
   bool busy_ = false;

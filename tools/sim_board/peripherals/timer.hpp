@@ -310,9 +310,9 @@ class Timer final : public RegisterBlock {
     count_ = overflows ? 0 : count_ + static_cast<uint32_t>(counts);
     count_since_ = at;
     if (overflows) update_event(at, true);
-    happen(at);
+    compare_channels(at);
   }
-  void happen(Cycles at) {
+  void compare_channels(Cycles at) {
     for (uint32_t channel = 0; channel < channel_count; ++channel) {
       if (channels_[channel].compare == count_ && input(channel) == 0) match(channel, at);
     }

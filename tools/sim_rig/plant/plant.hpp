@@ -189,16 +189,16 @@ class Plant {
   }
   /// What of the piston's flow enters the hose, beside gas and leak at the pump.
   [[nodiscard]] double entering_flow_mL_s() const {
-    const double swallows_mL_kPa =
+    const double compliance_flow_mL_s_kPa =
         (pump_compliance_mL_per_kPa_ + pump_gas_.compliance_mL_per_kPa(pump_end_kPa())) / step_s();
     const double loses = pump_leak_mL_s_kPa_;
-    if (swallows_mL_kPa == 0 && loses == 0 && !own_.pump_leak_mL_s) return piston_.flow_mL_s();
+    if (compliance_flow_mL_s_kPa == 0 && loses == 0 && !own_.pump_leak_mL_s) return piston_.flow_mL_s();
     // p = line.p + z Q and Q = Q_piston - C (p - p_before) / dt - G p.
     const Characteristic line = hose_.inlet();
     const double z = line.impedance_kPa_s_per_mL;
     const double without_kPa = line.pressure_kPa + z * (piston_.flow_mL_s() + pump_gas_owes_mL_ / step_s() +
-                                                        swallows_mL_kPa * pump_end_kPa());
-    const double share = 1 + z * (swallows_mL_kPa + loses);
+                                                        compliance_flow_mL_s_kPa * pump_end_kPa());
+    const double share = 1 + z * (compliance_flow_mL_s_kPa + loses);
     double pressure_kPa = without_kPa / share;
     if (own_.pump_leak_mL_s) pressure_kPa = behind_own_leak_kPa(without_kPa, share, z);
     return (pressure_kPa - line.pressure_kPa) / z;

@@ -162,16 +162,16 @@ TEST(Plant, ReadingsDoNotDependOnHowOftenItIsAsked) {
   PlantConfig config;
   config.cavity.noise_kPa = 0.03;
   Plant often(config);
-  Plant seldom(config);
+  Plant sparse(config);
   SinusoidalDrive drive_often(40, 1.2);
-  SinusoidalDrive drive_seldom(40, 1.2);
+  SinusoidalDrive drive_sparse(40, 1.2);
   for (int i = 1; i <= 1000; ++i) {
     drive_often.feed(often, i * 0.001);
     often.advance_to(i * 0.001);
   }
-  drive_seldom.feed(seldom, 1.0);
-  seldom.advance_to(1.0);
-  EXPECT_EQ(often.cavity_reading_kPa(), seldom.cavity_reading_kPa());
+  drive_sparse.feed(sparse, 1.0);
+  sparse.advance_to(1.0);
+  EXPECT_EQ(often.cavity_reading_kPa(), sparse.cavity_reading_kPa());
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 // The desk of cines: guide points with handles, and the fitted ventricle's walls under them. Every change goes to the server, which has it in
 // the file before it answers; what is shown is its points.
 const desk = (() => {
-  const { byId, ask, complain, clamp, inside, sizeButton, toolBar } = deskDoor;
+  const { byId, ask, complain, clamp, inside, sizeButton, toolBar } = deskCommon;
   const hints = {
     look: "Point at a point for what it is. Lines are the fitted walls. Double-click makes a picture large; the slider above the pictures moves them all.",
     move: "Pull a point to where this wall is seen. Then fit again.",
@@ -134,7 +134,7 @@ const desk = (() => {
     }
     return least;
   };
-  const tell = (player, at) => {
+  const describe = (player, at) => {
     const point = nearest(player, at, 3);
     if (!point) return "";
     const off = point.surface === "base" ? Infinity : fromWall(player, point);
@@ -181,7 +181,7 @@ const desk = (() => {
       player.draw();
     });
     canvas.addEventListener("pointermove", (event) => {
-      player.holder.querySelector(".cine-at").textContent = tell(player, at(event));
+      player.holder.querySelector(".cine-at").textContent = describe(player, at(event));
       if (drag?.player !== player) return;
       drag.path.push(at(event));
       player.draw();

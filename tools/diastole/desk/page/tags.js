@@ -1,7 +1,7 @@
 // The desk: tracked slices with handles. What is drawn becomes a choice (one line of the edits file) on the server, which answers with
 // all choices that stand; what is shown is theirs.
 const desk = (() => {
-  const { byId, ask, complain, clamp, inside, sizeButton, toolBar } = deskDoor;
+  const { byId, ask, complain, clamp, inside, sizeButton, toolBar } = deskCommon;
   const hints = {
     look: "Point at a line for its tag and its error, at a cross for why it was left out. Double-click makes a picture large.",
     line: "Pull a line to where this tag is seen; its neighbourhood comes along, with Shift the whole line. Then track again.",

@@ -1,5 +1,5 @@
 // What the desks' pages share: the way to the program, the bar of tools, and pictures that become large.
-const deskDoor = (() => {
+const deskCommon = (() => {
   const byId = (id) => document.getElementById(id);
   // The token comes behind # and is taken out of sight; it stays with this tab.
   if (location.hash.startsWith("#token=")) {

@@ -1,4 +1,4 @@
-#include "host/web/door.hpp"
+#include "host/web/access_policy.hpp"
 
 #include <fmt/format.h>
 #include <sys/random.h>
@@ -68,10 +68,10 @@ ConsoleAddress parse_console_address(const std::string& text, const std::string&
   return result;
 }
 
-Door::Door(const ConsoleAddress& address, std::string machine)
+AccessPolicy::AccessPolicy(const ConsoleAddress& address, std::string machine)
     : address_(address), machine_(lower(machine)), control_token_(new_token()), watch_token_(new_token()) {}
 
-bool Door::is_own(std::string_view name) const {
+bool AccessPolicy::is_own(std::string_view name) const {
   const std::string own = lower(name);
   if (own == "localhost") return true;
   if (const auto address = parsed_address(own))
@@ -80,8 +80,8 @@ bool Door::is_own(std::string_view name) const {
   return own == machine_ || own == machine_.substr(0, machine_.find('.'));
 }
 
-std::optional<Refusal> Door::check_place(std::string_view host,
-                                         std::optional<std::string_view> origin) const {
+std::optional<Refusal> AccessPolicy::check_place(std::string_view host,
+                                                 std::optional<std::string_view> origin) const {
   if (!is_own(split(host).name)) {
     return Refusal{
         403,
@@ -95,20 +95,20 @@ std::optional<Refusal> Door::check_place(std::string_view host,
   return std::nullopt;
 }
 
-std::optional<ConsoleRole> Door::role_of(std::string_view token) const {
+std::optional<ConsoleRole> AccessPolicy::role_of(std::string_view token) const {
   const bool controls = same_secret(token, control_token_);
   const bool watches = same_secret(token, watch_token_);
   if (controls) return ConsoleRole::control;
   return watches ? std::optional(ConsoleRole::watch) : std::nullopt;
 }
 
-Refusal Door::wrong_token() {
+Refusal AccessPolicy::wrong_token() {
   return {401,
           "The token in this address is not valid. The daemon makes a new one each time it starts: open the "
           "address that it printed, or the one that `diastole console` prints."};
 }
 
-std::string Door::url(ConsoleRole role, uint16_t port) const {
+std::string AccessPolicy::url(ConsoleRole role, uint16_t port) const {
   std::string name = address_.address.to_string();
   if (address_.address.is_unspecified()) {
     name = machine_;

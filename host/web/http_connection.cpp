@@ -18,22 +18,22 @@ namespace http = beast::http;
 using boost::asio::ip::tcp;
 using boost::beast::error_code;
 
-constexpr std::chrono::seconds request_patience{10};
+constexpr std::chrono::seconds request_timeout{10};
 constexpr int most_requests = 100;  // of one connection
 
 using Response = http::response<http::string_body>;
 
-class Visitor : public Connection, public std::enable_shared_from_this<Visitor> {
+class HttpConnection : public Connection, public std::enable_shared_from_this<HttpConnection> {
  public:
-  Visitor(std::shared_ptr<ServerState> state, tcp::socket socket)
+  HttpConnection(std::shared_ptr<ServerState> state, tcp::socket socket)
       : state_(std::move(state)),
         stream_(std::move(socket), state_->tls ? &*state_->tls : nullptr),
         number_(++state_->rpc_state->last_number) {}
 
   void begin() {
-    state_->visitors[number_] = shared_from_this();
+    state_->http_connections[number_] = shared_from_this();
     if (!stream_.encrypted()) return read();
-    stream_.tcp().expires_after(request_patience);
+    stream_.tcp().expires_after(request_timeout);
     stream_.async_handshake([self = shared_from_this()](error_code error) {
       if (!error) return self->read();
       const int reason = ERR_GET_REASON(static_cast<unsigned long>(error.value()));
@@ -42,7 +42,7 @@ class Visitor : public Connection, public std::enable_shared_from_this<Visitor> 
   }
 
   void close() override {
-    state_->visitors.erase(number_);
+    state_->http_connections.erase(number_);
     stream_.close();
   }
 
@@ -59,7 +59,7 @@ class Visitor : public Connection, public std::enable_shared_from_this<Visitor> 
   void read() {
     parser_.emplace();
     set_bounds(*parser_);
-    stream_.tcp().expires_after(request_patience);
+    stream_.tcp().expires_after(request_timeout);
     http::async_read(stream_, buffer_, *parser_,
                      [self = shared_from_this()](error_code error, size_t) { self->take(error); });
   }
@@ -72,7 +72,7 @@ class Visitor : public Connection, public std::enable_shared_from_this<Visitor> 
     if (error) return close();
     request_ = parser_->release();
     const Verdict verdict =
-        judge(state_->door, request_, state_->consoles.size(), ServerState::most_consoles);
+        judge(state_->policy, request_, state_->consoles.size(), ServerState::most_consoles);
     if (verdict.refusal) return refuse(*verdict.refusal);
     if (verdict.let_in_as) return open_socket(*verdict.let_in_as);
     if (verdict.page != nullptr) return reply(200, verdict.page->type, std::string(verdict.page->text));
@@ -81,7 +81,7 @@ class Visitor : public Connection, public std::enable_shared_from_this<Visitor> 
   }
 
   void open_socket(ConsoleRole role) {
-    state_->visitors.erase(number_);
+    state_->http_connections.erase(number_);
     open_console(state_, std::move(stream_), std::move(request_), role);
   }
 
@@ -102,7 +102,7 @@ class Visitor : public Connection, public std::enable_shared_from_this<Visitor> 
     response_.keep_alive(!last_);
     response_.body() = std::move(body);
     response_.prepare_payload();
-    stream_.tcp().expires_after(request_patience);
+    stream_.tcp().expires_after(request_timeout);
     http::async_write(stream_, response_, [self = shared_from_this()](error_code error, size_t) {
       if (error || self->last_) return self->close();
       self->read();
@@ -122,14 +122,14 @@ class Visitor : public Connection, public std::enable_shared_from_this<Visitor> 
 
 }  // namespace
 
-void receive_visitor(std::shared_ptr<ServerState> state, tcp::socket socket) {
-  if (state->visitors.size() >= ServerState::most_visitors) {
-    const auto oldest = state->visitors.begin()->second;
+void accept_connection(std::shared_ptr<ServerState> state, tcp::socket socket) {
+  if (state->http_connections.size() >= ServerState::most_http_connections) {
+    const auto oldest = state->http_connections.begin()->second;
     oldest->close();
   }
   error_code ignored;
   socket.set_option(boost::asio::socket_base::send_buffer_size(ServerState::kernel_bytes), ignored);
-  std::make_shared<Visitor>(std::move(state), std::move(socket))->begin();
+  std::make_shared<HttpConnection>(std::move(state), std::move(socket))->begin();
 }
 
 }  // namespace diastole::web

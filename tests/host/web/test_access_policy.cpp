@@ -1,4 +1,4 @@
-#include "host/web/door.hpp"
+#include "host/web/access_policy.hpp"
 
 #include <gmock/gmock.h>
 
@@ -16,13 +16,14 @@ ConsoleAddress at(const std::string& text) {
   return parse_console_address(text, "rig.toml", "daemon.console");
 }
 
-bool comes_in(const Door& door, std::string_view host, std::optional<std::string_view> origin = {}) {
-  return !door.check_place(host, origin);
+bool comes_in(const AccessPolicy& policy, std::string_view host,
+              std::optional<std::string_view> origin = {}) {
+  return !policy.check_place(host, origin);
 }
 
 std::string token_of(const std::string& url) { return url.substr(url.find("token=") + 6); }
 
-TEST(ConsoleDoor, AnAddressIsAPortOrAnAddressAndAPort) {
+TEST(ConsoleAccess, AnAddressIsAPortOrAnAddressAndAPort) {
   EXPECT_EQ(at("").address.to_string(), "127.0.0.1");
   EXPECT_EQ(at("").port, usual_port);
   EXPECT_EQ(at("80").port, 80);
@@ -35,53 +36,53 @@ TEST(ConsoleDoor, AnAddressIsAPortOrAnAddressAndAPort) {
   }
 }
 
-TEST(ConsoleDoor, ANameThatPointsHereIsNotOurs) {
-  const Door door(at("8600"), "rigpc");
+TEST(ConsoleAccess, ANameThatPointsHereIsNotOurs) {
+  const AccessPolicy policy(at("8600"), "rigpc");
   for (const char* own : {"127.0.0.1:8600", "localhost:8600", "LOCALHOST", "[::1]:8600", "127.0.0.1:9000"})
-    EXPECT_TRUE(comes_in(door, own)) << own;
+    EXPECT_TRUE(comes_in(policy, own)) << own;
   for (const char* strange : {"", ":8600", "evil.example:8600", "127.0.0.1.evil.example", "10.0.0.1:8600",
                               "rigpc:8600", "[::1", "localhost.evil.example:8600", "127.0.0.1@evil.example"})
-    EXPECT_FALSE(comes_in(door, strange)) << strange;
+    EXPECT_FALSE(comes_in(policy, strange)) << strange;
 }
 
-TEST(ConsoleDoor, BeyondThisMachineItsAddressesAndItsOwnNameAreOurs) {
-  const Door door(at("0.0.0.0:8600"), "RigPC");
-  EXPECT_TRUE(door.reaches_beyond_this_machine());
+TEST(ConsoleAccess, BeyondThisMachineItsAddressesAndItsOwnNameAreOurs) {
+  const AccessPolicy policy(at("0.0.0.0:8600"), "RigPC");
+  EXPECT_TRUE(policy.reaches_beyond_this_machine());
   for (const char* own : {"10.0.0.1:8600", "rigpc:8600", "RIGPC", "localhost:8600"})
-    EXPECT_TRUE(comes_in(door, own)) << own;
+    EXPECT_TRUE(comes_in(policy, own)) << own;
   for (const char* strange :
        {"evil.example:8600", "rigpcevil.example:8600", "rigpc.evil.example:8600", "rigpc.", "rig"})
-    EXPECT_FALSE(comes_in(door, strange)) << strange;
-  const Door qualified(at("0.0.0.0:8600"), "rigpc.lab.example");
+    EXPECT_FALSE(comes_in(policy, strange)) << strange;
+  const AccessPolicy qualified(at("0.0.0.0:8600"), "rigpc.lab.example");
   EXPECT_TRUE(comes_in(qualified, "rigpc.lab.example:8600"));
   EXPECT_TRUE(comes_in(qualified, "rigpc:8600"));
   for (const char* strange : {"rigpc.lab:8600", "rigpc.evil.example:8600", "lab.example:8600"})
     EXPECT_FALSE(comes_in(qualified, strange)) << strange;
-  EXPECT_THAT(door.url(ConsoleRole::control, 8600), testing::StartsWith("https://rigpc:8600/#token="));
+  EXPECT_THAT(policy.url(ConsoleRole::control, 8600), testing::StartsWith("https://rigpc:8600/#token="));
 }
 
-TEST(ConsoleDoor, APageOfAnotherSiteIsRefused) {
-  const Door door(at("8600"), "rigpc");
+TEST(ConsoleAccess, APageOfAnotherSiteIsRefused) {
+  const AccessPolicy policy(at("8600"), "rigpc");
   const std::string_view host = "127.0.0.1:8600";
-  EXPECT_TRUE(comes_in(door, host, "http://127.0.0.1:8600"));
+  EXPECT_TRUE(comes_in(policy, host, "http://127.0.0.1:8600"));
   for (const char* strange : {"", "null", "http://evil.example", "http://127.0.0.1:8601", "http://127.0.0.1",
                               "http://127.0.0.1:8600.evil.example", "file://"})
-    EXPECT_FALSE(comes_in(door, host, strange)) << strange;
+    EXPECT_FALSE(comes_in(policy, host, strange)) << strange;
 }
 
-TEST(ConsoleDoor, EachTokenOpensForItsRoleAndNothingElseOpens) {
-  const Door door(at("8600"), "rigpc");
-  const std::string control = token_of(door.url(ConsoleRole::control, 8600));
-  const std::string watch = token_of(door.url(ConsoleRole::watch, 8600));
-  EXPECT_EQ(door.role_of(control), ConsoleRole::control);
-  EXPECT_EQ(door.role_of(watch), ConsoleRole::watch);
-  EXPECT_FALSE(door.role_of(""));
-  EXPECT_FALSE(door.role_of(control.substr(1)));
-  EXPECT_FALSE(door.role_of(control + "0"));
-  EXPECT_FALSE(Door(at("8600"), "rigpc").role_of(control)) << "each start has its own";
+TEST(ConsoleAccess, EachTokenOpensForItsRoleAndNothingElseOpens) {
+  const AccessPolicy policy(at("8600"), "rigpc");
+  const std::string control = token_of(policy.url(ConsoleRole::control, 8600));
+  const std::string watch = token_of(policy.url(ConsoleRole::watch, 8600));
+  EXPECT_EQ(policy.role_of(control), ConsoleRole::control);
+  EXPECT_EQ(policy.role_of(watch), ConsoleRole::watch);
+  EXPECT_FALSE(policy.role_of(""));
+  EXPECT_FALSE(policy.role_of(control.substr(1)));
+  EXPECT_FALSE(policy.role_of(control + "0"));
+  EXPECT_FALSE(AccessPolicy(at("8600"), "rigpc").role_of(control)) << "each start has its own";
 }
 
-TEST(ConsoleDoor, TokensAreLongAndNeverTheSame) {
+TEST(ConsoleAccess, TokensAreLongAndNeverTheSame) {
   EXPECT_THAT(new_token(), testing::MatchesRegex("[0-9a-f]{32}"));
   EXPECT_NE(new_token(), new_token());
   EXPECT_TRUE(same_secret("abc", "abc"));
@@ -89,7 +90,7 @@ TEST(ConsoleDoor, TokensAreLongAndNeverTheSame) {
   EXPECT_FALSE(same_secret("abc", "ab"));
 }
 
-TEST(ConsoleDoor, TheTokenIsFoundInEitherHeader) {
+TEST(ConsoleAccess, TheTokenIsFoundInEitherHeader) {
   EXPECT_EQ(token_in("Bearer x1", ""), "x1");
   EXPECT_EQ(token_in("", "diastole, token.x2"), "x2");
   EXPECT_EQ(token_in("", "token.x3,diastole"), "x3");

@@ -33,11 +33,11 @@ struct Refusal {
   std::string sentence;  ///< for the person
 };
 
-class Door {
+class AccessPolicy {
  public:
   /// New tokens; `machine`: the machine's own name, as gethostname returns it. Beyond loopback it is taken as it is and
   /// up to its first dot, and no other: whoever owns a domain can make MACHINE.his.domain point here.
-  Door(const ConsoleAddress& address, std::string machine);
+  AccessPolicy(const ConsoleAddress& address, std::string machine);
 
   /// `origin`: none when the header is absent, as with clients that are no browsers.
   [[nodiscard]] std::optional<Refusal> check_place(std::string_view host,

@@ -1,4 +1,4 @@
-#include "host/acquisition/disk_room.hpp"
+#include "host/acquisition/disk_space.hpp"
 
 #include <fmt/format.h>
 
@@ -37,7 +37,7 @@ std::string megabytes(uint64_t bytes) { return fmt::format("{:.1f} MB", 1e-6 * s
 
 }  // namespace
 
-DiskRoom room_for(const RunSize& run) {
+DiskSpace required_space(const RunSize& run) {
   constexpr double cycle_bytes = 150;  // trigger and segment records
   const double cycles = static_cast<double>(run.cycles);
   return {static_cast<uint64_t>(events_bytes +
@@ -46,10 +46,10 @@ DiskRoom room_for(const RunSize& run) {
                                 margin * (run_file_bytes_s(run) * run.duration_s + number_bytes * cycles))};
 }
 
-void check_room(const std::filesystem::path& directory, const RunSize& run) {
+void check_disk_space(const std::filesystem::path& directory, const RunSize& run) {
   std::error_code error;
   const auto space = std::filesystem::space(directory, error);
-  const DiskRoom needed = room_for(run);
+  const DiskSpace needed = required_space(run);
   if (error || space.available >= needed.total_bytes()) return;
   throw InputError({directory.string(), "",
                     fmt::format("has {} free, and a run of {:.0f} s needs about {} (journal {}, run file {})",
