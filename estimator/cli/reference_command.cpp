@@ -69,6 +69,14 @@ ExitCode run_reference(const ReferenceArguments& arguments, const CommandOutput&
     } else {
       print_reference(reference, arguments.output);
     }
+    if (!inference::is_settled(reference.termination)) {
+      fmt::print(stderr,
+                 "diastole reference: a session's fit did not settle, so that nothing can be named with this "
+                 "reference. {}\n"
+                 "  Leave sessions out one by one to find which; something may be wrong in it.\n",
+                 inference::sentence(reference.termination));
+      return ExitCode::negative;
+    }
   } catch (const ReferenceInterrupted&) {
     std::cerr << "diastole reference: interrupted; nothing was written\n";
     return ExitCode::negative;

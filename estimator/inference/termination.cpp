@@ -13,7 +13,7 @@ std::string_view sentence(Termination termination) {
       "Converged.",
       "Converged with an unknown on its bound; the cost falls beyond it.",
       "Failed: the cost has a slope, but no step lowers it.",
-      "Stopped at the limit of iterations; the cost was still falling.",
+      "Stopped at the limit of iterations before it was at rest.",
       "Stopped on request; the cost was still falling.",
       "Failed: the model has no solution at the start."};
   return sentences[static_cast<size_t>(termination)];

@@ -342,9 +342,12 @@ class Acquisition {
     keep({tick, tick ? 0 : clock_.now_ns(), level, code, text});
   }
   void keep(const EventRecord& event) {
-    if (event.level == "error") outcome_.last_error = event.text;
+    if (event.level == "error") note_error(event.text);
     write(event);
     hooks_.remark({event.level, event.code, event.text});
+  }
+  void note_error(const std::string& text) {
+    if (outcome_.first_error.empty()) outcome_.first_error = text;
   }
   void write(const auto& record) {
     if (!append(journal_, record)) fail_journal();
@@ -352,7 +355,7 @@ class Acquisition {
   void fail_journal() {
     if (outcome_.end == journal_failed) return;
     outcome_.end = journal_failed;
-    outcome_.last_error = journal_.problem();
+    note_error(journal_.problem());
     hooks_.remark({"error", journal_failed, journal_.problem() + "; the pump is being stopped"});
     if (tail_until_ns_) ended_ = true;  // the pump is at rest already
     if (ended_) return;

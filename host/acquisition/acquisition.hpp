@@ -58,7 +58,7 @@ struct RunOutcome {
   std::string end;  ///< "completed", "stopped_at_cycle_end", ..., "link_lost", "journal_failed"
   uint32_t cycles = 0;
   RunProgress counts;
-  std::string last_error;  ///< the last remark of level "error"; empty: none
+  std::string first_error;  ///< the first remark of level "error"; empty: none
   [[nodiscard]] bool regular() const {
     return end == "completed" || end == "stopped_at_cycle_end" || end == "stopped_now";
   }

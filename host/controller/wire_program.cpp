@@ -107,14 +107,14 @@ wire::UploadWaveform waveform_message(const std::vector<int16_t>& rises, size_t 
 }
 
 std::vector<wire::WaveformPoints> waveform_batches(const std::vector<int16_t>& rises) {
-  std::vector<wire::WaveformPoints> lots;
+  std::vector<wire::WaveformPoints> batches;
   for (size_t first = 0; first < rises.size(); first += wire::WaveformPoints::kMaxCount) {
-    wire::WaveformPoints& lot = lots.emplace_back();
-    lot.first = static_cast<uint16_t>(first);
-    lot.count = static_cast<uint8_t>(std::min(wire::WaveformPoints::kMaxCount, rises.size() - first));
-    std::copy_n(rises.begin() + static_cast<std::ptrdiff_t>(first), lot.count, lot.rise.begin());
+    wire::WaveformPoints& batch = batches.emplace_back();
+    batch.first = static_cast<uint16_t>(first);
+    batch.count = static_cast<uint8_t>(std::min(wire::WaveformPoints::kMaxCount, rises.size() - first));
+    std::copy_n(rises.begin() + static_cast<std::ptrdiff_t>(first), batch.count, batch.rise.begin());
   }
-  return lots;
+  return batches;
 }
 
 wire::Arm arm_message(const Experiment& experiment, const RigConfig& rig) {

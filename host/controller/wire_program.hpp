@@ -30,7 +30,7 @@ wire::Configure configuration(const RigConfig& rig, uint32_t microstep_pL);
 double reported_rate_Hz(const Experiment& experiment, const ControllerConfig& controller);
 
 wire::AddSegment segment_message(const Experiment& experiment, size_t index);
-/// An uploaded waveform begins with this message, and its points follow in lots.
+/// An uploaded waveform begins with this message, and its points follow in batches.
 wire::UploadWaveform waveform_message(const std::vector<int16_t>& rises, size_t number);
 std::vector<wire::WaveformPoints> waveform_batches(const std::vector<int16_t>& rises);
 wire::Arm arm_message(const Experiment& experiment, const RigConfig& rig);

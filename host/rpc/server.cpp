@@ -190,13 +190,13 @@ class RpcServer::Listener : public std::enable_shared_from_this<Listener> {
 
  private:
   void take(const std::shared_ptr<RpcState>& rpc_state, stream_protocol::socket socket) {
-    evict_connection();
+    evict_if_full();
     const auto connection = std::make_shared<Connection>(rpc_state, connections_, std::move(socket));
     connections_->emplace(connection->number(), connection);
     connection->read();
   }
 
-  void evict_connection() {
+  void evict_if_full() {
     const auto& all = *connections_;
     if (all.size() < most_connections) return;
     const auto rank = [](const auto& entry) {

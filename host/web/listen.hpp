@@ -1,5 +1,5 @@
 #pragma once
-// A place at which browsers are heard.
+// Opens a socket at which browsers connect.
 
 #include <utility>  // before Asio, which uses std::exchange without it
 

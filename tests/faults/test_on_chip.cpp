@@ -138,7 +138,7 @@ TEST(Faults, LateTrigger) {
   });
   EXPECT_GT(late, tried / 4);
   add_to_table({"late trigger", "the core held up to 0.6 ms about it", tried, survived,
-                fmt::format("{} late, each told with the time at its pin", late)});
+                fmt::format("{} late, each reported with the time at its pin", late)});
 }
 
 TEST(Faults, CrystalFails) {

@@ -100,7 +100,7 @@ TEST(Faults, CableUnplugged) {
   EXPECT_LE(slowest_flag_ms, 1000);
   EXPECT_LE(slowest_return_ms, 2000);
   add_to_table({"cable unplugged", "random phases of a run", tried, survived,
-                fmt::format("at rest in the lease; told in {:.0f} ms, back in {:.0f} ms", slowest_flag_ms,
+                fmt::format("at rest in the lease; reported in {:.0f} ms, back in {:.0f} ms", slowest_flag_ms,
                             slowest_return_ms)});
 }
 

@@ -203,7 +203,7 @@ TEST(Faults, LinePulledOut) {
   EXPECT_LE(slowest_rest_s, lease_s) << "and not a step from then on, with the line back and a daemon at it";
   EXPECT_LE(slowest_return_s, 2);
   add_to_table({"pty hang-up", "the line pulled out of the daemon", tried, survived,
-                fmt::format("told in {:.0f} ms, at rest in {:.0f} ms and from then on, back in {:.0f} ms",
+                fmt::format("reported in {:.0f} ms, at rest in {:.0f} ms and from then on, back in {:.0f} ms",
                             1e3 * slowest_report_s, 1e3 * slowest_rest_s, 1e3 * slowest_return_s)});
 }
 

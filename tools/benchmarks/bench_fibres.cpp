@@ -29,6 +29,7 @@
 #include "estimator/mesh/ellipsoid.hpp"
 #include "estimator/mesh/placed_mesh.hpp"
 #include "estimator/mesh/point_locator.hpp"
+#include "protocol/contract/angle.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
@@ -121,7 +122,7 @@ FieldErrors field_errors(const imaging::FibreEstimate& field, const fs::path& tr
     if (!located) throw InputError({truth.string(), "", "a place lies outside the mesh", ""});
     const imaging::FibreAt at = field.at(located->point);
     const double cosine = std::abs(at.direction.dot(Eigen::Vector3d(row[3], row[4], row[5])));
-    const double error_deg = std::acos(std::min(1.0, cosine)) * 180 / std::numbers::pi;
+    const double error_deg = std::acos(std::min(1.0, cosine)) / rad_per_deg;
     const double region = row[13], l = row[11];
     (region == 1   ? errors.infarct
      : region == 2 ? errors.disarray

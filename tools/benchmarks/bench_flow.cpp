@@ -14,6 +14,7 @@
 #include <nlohmann/json.hpp>
 
 #include "estimator/imaging/flow/flow_session.hpp"
+#include "estimator/inference/intervals.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tools/score/score.hpp"
@@ -26,7 +27,7 @@ using nlohmann::json;
 
 constexpr double stroke_percent = 1, net_percent = 1, peak_percent = 3, loop_percent = 8,
                  background_cm_s = 0.3;
-constexpr double least_coverage = 0.90, most_coverage = 0.98, normal_975 = 1.96;
+constexpr double least_coverage = 0.90, most_coverage = 0.98;
 
 struct Counts {
   size_t inside = 0, phases = 0;
@@ -61,7 +62,7 @@ void bench_scan(const fs::path& folder, const std::string& name, const json& lab
     const imaging::ValueWithError& found = flow.phases[k].flow_mL_s;
     const double over_sigma = (found.value - truth[k]) / found.sigma;
     squares += over_sigma * over_sigma / static_cast<double>(truth.size());
-    inside += std::abs(over_sigma) < normal_975 ? 1 : 0;
+    inside += std::abs(over_sigma) < inference::normal_95 ? 1 : 0;
     peak = std::max(peak, std::abs(found.value));
     true_peak = std::max(true_peak, std::abs(truth[k]));
   }

@@ -17,6 +17,7 @@
 #include "estimator/fit/considered_errors.hpp"
 #include "estimator/fit/elastic_motion.hpp"
 #include "estimator/fit/fit.hpp"
+#include "estimator/inference/intervals.hpp"
 #include "estimator/mesh/ellipsoid.hpp"
 
 namespace diastole {
@@ -140,7 +141,7 @@ struct Miss {
 
 /// Prints held of all as a rate with Wilson's interval; whether some rate of 85 to 95 % is in that.
 bool print_rate(const char* what, int held, int all) {
-  constexpr double z = 1.96;
+  constexpr double z = inference::normal_95;
   const double p = static_cast<double>(held) / all, shrink = 1 + z * z / all;
   const double middle = (p + z * z / (2 * all)) / shrink;
   const double reach = z / shrink * std::sqrt(p * (1 - p) / all + z * z / (4.0 * all * all));

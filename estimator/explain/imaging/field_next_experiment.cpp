@@ -67,15 +67,15 @@ class Gram {
     sum_.topLeftCorner(sums.rows(), sums.cols()) += weight * weight * sums;
   }
   [[nodiscard]] const Eigen::MatrixXd& sums() const { return sum_; }
-  [[nodiscard]] double separation() const { return inference::separation(sum_, hardly_known()); }
+  [[nodiscard]] double separation() const { return inference::separation(sum_, weak_prior()); }
   [[nodiscard]] Eigen::MatrixXd information() const {
     const Index n = sum_.cols() - 1;
-    return sum_.bottomRightCorner(n, n) + hardly_known();
+    return sum_.bottomRightCorner(n, n) + weak_prior();
   }
 
  private:
   /// So that unknowns of which the rows say nothing are harmless.
-  [[nodiscard]] Eigen::MatrixXd hardly_known() const {
+  [[nodiscard]] Eigen::MatrixXd weak_prior() const {
     const Index n = sum_.cols() - 1;
     return 1e-12 * Eigen::MatrixXd::Identity(n, n);
   }

@@ -195,7 +195,7 @@ class SetSearch {
   }
   void search_from_base();
   void take_base_for_finer(double times);
-  [[nodiscard]] double gain_if_finer(double times, const EffectSet& plain) const;
+  [[nodiscard]] double posterior_if_finer(double times, const EffectSet& plain) const;
   void search_if_finer();
   void fit_plain_and_singles_again();
   [[nodiscard]] bool is_plain_near() const;
@@ -527,7 +527,7 @@ void SetSearch::take_base_for_finer(double times) {
 
 /// The log posterior that the best set would have in a rig of parts so many times finer: the rig without effects that was fitted, and
 /// the responses, by linear algebra. What effects with moments would do is not among them.
-double SetSearch::gain_if_finer(double times, const EffectSet& plain) const {
+double SetSearch::posterior_if_finer(double times, const EffectSet& plain) const {
   const rig::TolerancePrior finer = problem_.finer_prior(times);
   const VectorXd target = plain.target();
   MatrixXd columns = plain.columns;
@@ -553,8 +553,8 @@ void SetSearch::search_if_finer() {
   const double log_odds = -std::log(static_cast<double>(finer.size()));
   double best = 0.0, most = -std::numeric_limits<double>::infinity();
   for (const double times : finer) {
-    const double gain = gain_if_finer(times, *plain) + log_odds;
-    if (gain > most) std::tie(most, best) = std::pair(gain, times);
+    const double posterior = posterior_if_finer(times, *plain) + log_odds;
+    if (posterior > most) std::tie(most, best) = std::pair(posterior, times);
   }
   if (most < best_posterior() - linear_errs) return;
   report("seeking the same in a rig of finer parts");

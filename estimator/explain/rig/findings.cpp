@@ -189,7 +189,7 @@ std::vector<Candidate> candidates(const EffectLibrary& known, const WeighedSets&
     } else {
       row.verdict = fmt::format("probability {:.2g}", probability[set.ids()]);
     }
-    if (!inference::is_settled(set.termination)) row.verdict += "; its search did not end";
+    if (!inference::is_settled(set.termination)) row.verdict += "; its search was not brought to its end";
     list.push_back(std::move(row));
   }
   for (const auto& single : search.single_gains)

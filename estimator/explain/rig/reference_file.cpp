@@ -58,7 +58,7 @@ std::string to_json(const Reference& reference) {
   }
   json["fingerprint"] = reference.fingerprint;
   json["sessions"] = reference.sessions;
-  json["termination"] = reference.termination;
+  json["termination"] = written(reference.termination);
   json["rig"] = {{"hose_length_m", reference.hose_length_m}, {"hose_bore_mm", reference.hose_bore_mm}};
   json["shares"] = {{"all", reference.all}, {"again", reference.again}};
   json["tolerances"] = {{"names", reference.tolerances},
@@ -84,8 +84,7 @@ Reference reference_from_json(std::string_view text, const std::string& file) {
     }
     reference.fingerprint = json.at("fingerprint").get<std::string>();
     reference.sessions = json.at("sessions").get<size_t>();
-    if (json.contains("termination"))
-      reference.termination = json.at("termination").get<inference::Termination>();
+    if (json.contains("termination")) read_json(json.at("termination"), reference.termination);
     if (json.contains("rig")) {
       reference.hose_length_m = json.at("rig").at("hose_length_m").get<double>();
       reference.hose_bore_mm = json.at("rig").at("hose_bore_mm").get<double>();

@@ -279,8 +279,8 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
     return fit_with_shares(z, columns, problem.error(), from);
   };
   out.evidence = judged(shares);
-  bool is_ended = false;
-  for (int round = 0; round < most_rounds && !is_ended; ++round) {
+  bool at_rest = false;
+  for (int round = 0; round < most_rounds && !at_rest; ++round) {
     set.set_variance(out.evidence.variance);
     inference::SearchOptions options;
     options.iteration_limit = 40;  // a bubble and its exponent go a long way along a valley
@@ -291,8 +291,7 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
     options.held = set.moments();  // event_scan.hpp; what is shown changes by leaps with them
     const inference::SearchResult found = minimise(set, q, options);
     out.termination = found.termination;
-    is_ended = found.termination == inference::Termination::no_solution;
-    if (is_ended) break;
+    if (found.termination == inference::Termination::no_solution) break;
     q = found.q;
     // Slopes by differences to one side hold curvature: a search that they end goes on with those to both.
     const bool again = found.termination == inference::Termination::stalled && set.differ_to_both_sides();
@@ -300,16 +299,13 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
     const double before = out.evidence.log_evidence;
     out.evidence = judged(out.evidence.shares);
     const bool has_no_end = found.crept || found.termination == inference::Termination::iteration_limit;
-    if (!again && !(has_no_end && round == 0) && std::abs(out.evidence.log_evidence - before) < rested) {
-      // Many steps that together bring less than decides anything: it has arrived.
-      if (has_no_end) out.termination = inference::Termination::converged;
-      is_ended = true;
-    } else {
-      is_ended =
-          out.evidence.log_evidence + log_prior(problem, set, set.model(q)) < best_so_far - out_of_reach;
-    }
+    at_rest = !again && !(has_no_end && round == 0) && out.evidence.settled &&
+              std::abs(out.evidence.log_evidence - before) < rested;
+    // Many steps that together bring less than decides anything: it has arrived.
+    if (at_rest && has_no_end) out.termination = inference::Termination::converged;
+    if (out.evidence.log_evidence + log_prior(problem, set, set.model(q)) < best_so_far - out_of_reach) break;
   }
-  if (inference::is_settled(out.termination) && !(is_ended && out.evidence.settled))
+  if (!at_rest && inference::is_settled(out.termination))
     out.termination = inference::Termination::iteration_limit;
   out.model = set.model(q);
   out.shown = set.shown(q);
@@ -340,7 +336,8 @@ EffectSet fit_set(const rig::SessionProblem& problem, const SessionModel& start,
 
 EffectSet fit_set_exactly(const rig::SessionProblem& problem, const EffectSet& near) {
   SetProblem set(problem, near.model, near.known, Nuisances::simulated);
-  EffectSet found = search(problem, set, near.known, near.evidence.shares, near.log_posterior);
+  EffectSet found =
+      search(problem, set, near.known, near.evidence.shares, -std::numeric_limits<double>::infinity());
   found.exact = true;
   return found;
 }

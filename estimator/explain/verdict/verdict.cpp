@@ -49,7 +49,8 @@ std::string verdict_sentence(const Explanation& found) {
   for (const SearchEnd& search : found.searches)
     if (!inference::is_settled(search.termination))
       unsettled +=
-          fmt::format(" The search of {} did not converge: {}", search.of_reference ? "the reference" : words_of(search.effects, "the base model"),
+          fmt::format(" The search of {} did not converge: {}",
+                      search.of_reference ? "the reference" : words_of(search.effects, "the base model"),
                       inference::sentence(search.termination));
   std::string others;
   for (const auto& other : found.ambiguous_with)

@@ -11,6 +11,7 @@
 #include "estimator/parallel/parallel_for.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/signal/median.hpp"
+#include "protocol/signal/quantile.hpp"
 
 namespace diastole::imaging {
 namespace {
@@ -57,10 +58,8 @@ SliceSignals signals_of(const DiffusionSeries& series, size_t slice) {
     }
   }
   if (brightness.size() < least_bright_voxels) return signals;
-  std::vector<double> sorted = brightness;
-  std::sort(sorted.begin(), sorted.end());
   // Air goes, tissue beside bright fluid stays.
-  const double bright = 0.3 * sorted[sorted.size() * 99 / 100];
+  const double bright = 0.3 * signal::quantile(brightness, 0.99);
   std::vector<Eigen::VectorXd> chosen;
   for (size_t i = 0; i < brightness.size(); ++i)
     if (brightness[i] >= bright) chosen.push_back(std::move(signals.voxels[i]));

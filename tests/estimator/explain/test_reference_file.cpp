@@ -21,7 +21,9 @@ TEST(Reference, IsReadAsItWasWritten) {
   reference.sessions = 2;
   reference.fingerprint = "0badcafe";
   reference.termination = inference::Termination::stalled;
-  const Reference read = reference_from_json(to_json(reference), "rig.reference.json");
+  const std::string text = to_json(reference);
+  EXPECT_THAT(text, testing::HasSubstr("\"termination\": \"stalled\""));
+  const Reference read = reference_from_json(text, "rig.reference.json");
   EXPECT_EQ(read.tolerances, reference.tolerances);
   EXPECT_EQ(read.covariance, reference.covariance);
   EXPECT_EQ(read.segments.at("sinusoidal").misfit, reference.segments["sinusoidal"].misfit);

@@ -65,7 +65,7 @@ TEST(PointFields, OfACylinderFollowTheClosedForm) {
   EXPECT_NEAR(hoop_force, pressure_kPa * exact.a_mm, 0.002 * hoop_force);
 }
 
-TEST(PointFields, OfALumpAtRestHaveNoStress) {
+TEST(PointFields, OfAnInclusionAtRestHaveNoStress) {
   ElasticModel model = gel(6.5, {5, 3, 2}, {.stiffness = inclusion(4.0)});
   double stiffest = 1.0;
   for (size_t element = 0; element < model.mesh().element_count(); ++element)

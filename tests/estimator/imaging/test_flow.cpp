@@ -218,9 +218,9 @@ TEST(Flow, WhatCannotBeMeasuredIsRefusedWithTagAndRemedy) {
   PhaseContrastProtocol protocol = small();
   protocol.says_venc = false;
   EXPECT_THAT(refusal(phantom(), protocol), AllOf(HasSubstr("(0018,9197)"), HasSubstr("--venc")));
-  const FlowMeasurement reported = measured(phantom(), protocol, {.venc_cm_s = 100.0});
-  EXPECT_EQ(reported.scan.venc_source, "--venc");
-  expect_true(reported, phantom());
+  const FlowMeasurement by_option = measured(phantom(), protocol, {.venc_cm_s = 100.0});
+  EXPECT_EQ(by_option.scan.venc_source, "--venc");
+  expect_true(by_option, phantom());
 
   protocol = small();
   protocol.has_magnitude = false;

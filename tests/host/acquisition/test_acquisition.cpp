@@ -369,8 +369,17 @@ TEST(Acquisition, ALineThatIsUnpluggedBeforeTheStartLeavesNoRunAndTheReason) {
     return StopRequest::none;
   });
   EXPECT_EQ(session.outcome.end, "link_lost");
-  EXPECT_THAT(session.outcome.last_error, testing::HasSubstr("the pump stops by itself"));
+  EXPECT_THAT(session.outcome.first_error, testing::HasSubstr("the pump stops by itself"));
   EXPECT_THROW((void)session.assemble(), NothingRecorded);
+}
+
+TEST(Acquisition, AnEmergencyStopBeforeTheStartIsTheReasonOfARunThatDidNotStart) {
+  SessionOnDesk session(short_session);
+  session.run([&] {
+    session.desk.controller->set_estop(true);
+    return StopRequest::none;
+  });
+  EXPECT_THAT(session.outcome.first_error, testing::HasSubstr("mergency stop"));
 }
 
 TEST(Acquisition, ADiskThatFailsToFlushEndsTheRunAsJournalFailed) {
