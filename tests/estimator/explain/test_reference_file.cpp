@@ -22,7 +22,7 @@ TEST(Reference, IsReadAsItWasWritten) {
   reference.fingerprint = "0badcafe";
   reference.termination = inference::Termination::stalled;
   const std::string text = to_json(reference);
-  EXPECT_THAT(text, testing::HasSubstr("\"termination\": \"stalled\""));
+  EXPECT_THAT(text, testing::HasSubstr("\"termination\":\"stalled\""));
   const Reference read = reference_from_json(text, "rig.reference.json");
   EXPECT_EQ(read.tolerances, reference.tolerances);
   EXPECT_EQ(read.covariance, reference.covariance);

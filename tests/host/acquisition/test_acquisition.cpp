@@ -373,15 +373,6 @@ TEST(Acquisition, ALineThatIsUnpluggedBeforeTheStartLeavesNoRunAndTheReason) {
   EXPECT_THROW((void)session.assemble(), NothingRecorded);
 }
 
-TEST(Acquisition, AnEmergencyStopBeforeTheStartIsTheReasonOfARunThatDidNotStart) {
-  SessionOnDesk session(short_session);
-  session.run([&] {
-    session.desk.controller->set_estop(true);
-    return StopRequest::none;
-  });
-  EXPECT_THAT(session.outcome.first_error, testing::HasSubstr("mergency stop"));
-}
-
 TEST(Acquisition, ADiskThatFailsToFlushEndsTheRunAsJournalFailed) {
   SessionOnDesk session(short_session);
   session.flush = [](int) {
