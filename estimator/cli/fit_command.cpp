@@ -170,42 +170,14 @@ bool ended_on_bound(const FitRecord& record) {
                      });
 }
 
-ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
-  Study study = read_study(arguments.study);
-  // What is wrong with the command's files is reported before images are tracked and data examined.
-  if (arguments.output && arguments.output == arguments.checkpoint) {
-    throw InputError({arguments.output->string(), "--checkpoint", "is the file of the result too",
-                      "Give the checkpoint a file of its own."});
-  }
-  if (arguments.output) {
-    require_output({*arguments.output, inputs_of(study), fit_file_mark, arguments.force});
-  }
-  std::optional<WorkLoop> loop;
-  if (arguments.energy) loop = read_work_loop(*arguments.energy);
-  const std::optional<std::filesystem::path> tracked = use_images(study);
-  if (arguments.output)  // nor may it be the tags of these images
-    require_output({*arguments.output, inputs_of(study), fit_file_mark, arguments.force});
-  if (!arguments.smooth.empty()) set_smoothness(study, arguments.smooth);
-  if (arguments.study.unload) {
-    (void)imaged_load_of(study);
-  } else {
-    remark_on_imaged_load(study, "fit");
-  }
-  const Measurement measurement = read_measurement(study);
+/// All but what the data and the command's files give. `study` outlives it.
+StudyFitOptions options_of(const FitArguments& arguments, const Study& study) {
   StudyFitOptions options;
-  if (loop) options.work = measured_work(*loop, measurement, *arguments.energy);
-  fmt::print(stderr, "Fitting {} in {} frames.\n",
-             measurement.tags.empty() ? fmt::format("{} 3-D points", measurement.points.size())
-                                      : fmt::format("{} tag points", measurement.tags.size()),
-             measurement.frames.size());
-  std::vector<Finding> findings = examined(arguments, study, measurement);
-  std::ranges::copy(model_findings(study), std::back_inserter(findings));
-  if (has_error(findings)) return refuse_data(refused_fit(study, measurement, std::move(findings)), out);
   options.iteration_limit = arguments.iteration_limit;
   options.robustness = arguments.robust == "yes"  ? Robustness::always
                        : arguments.robust == "no" ? Robustness::never
                                                   : Robustness::if_needed;
-  options.on_iteration = [&](const FitIteration& step) {
+  options.on_iteration = [&study](const FitIteration& step) {
     std::string values;
     for (size_t i = 0; i < step.parameters.size(); ++i) {
       values += fmt::format("  {} {:.5g}", study.law.parameters[i].name, step.parameters[i]);
@@ -230,18 +202,11 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
       if (done % 50 == 0 || done == all) fmt::print(stderr, "  posterior: {} of {} steps\n", done, all);
     };
   }
-  if (arguments.checkpoint) {
-    require_output({*arguments.checkpoint, inputs_of(study), fit_file_mark, arguments.force});
-    options.on_checkpoint = [&](const FitRecord& reached) { write_fit_file(reached, *arguments.checkpoint); };
-  }
-  const Interruption interruption;
   options.interrupted = [] { return Interruption::requested(); };
-  FitRecord record = fit_study(study, measurement, options);
-  record.findings = std::move(findings);
-  if (tracked) record.images = std::filesystem::weakly_canonical(*tracked).string();
-  fmt::print(stderr, "{} {} iterations, {} equilibrium solutions, {:.1f} s.\n", record.reason,
-             record.iterations, record.forward_solves, record.seconds);
-  if (arguments.output) write_fit_file(record, *arguments.output);
+  return options;
+}
+
+void print_result(const FitRecord& record, const FitArguments& arguments, const CommandOutput& out) {
   if (Interruption::requested() && !record.converged) {
     const bool kept = arguments.checkpoint && std::filesystem::exists(*arguments.checkpoint);
     fmt::print(stderr, "{}\n",
@@ -257,6 +222,51 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
     print_record(record);
     if (arguments.output) fmt::print("\nThe result is in {}\n", arguments.output->string());
   }
+}
+
+ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
+  Study study = read_study(arguments.study);
+  // What is wrong with the command's files is reported before images are tracked and data examined.
+  if (arguments.output && arguments.output == arguments.checkpoint) {
+    throw InputError({arguments.output->string(), "--checkpoint", "is the file of the result too",
+                      "Give the checkpoint a file of its own."});
+  }
+  if (arguments.output) {
+    require_output({*arguments.output, inputs_of(study), fit_file_mark, arguments.force});
+  }
+  std::optional<WorkLoop> loop;
+  if (arguments.energy) loop = read_work_loop(*arguments.energy);
+  const std::optional<std::filesystem::path> tracked = use_images(study);
+  if (arguments.output)  // nor may it be the tags of these images
+    require_output({*arguments.output, inputs_of(study), fit_file_mark, arguments.force});
+  if (!arguments.smooth.empty()) set_smoothness(study, arguments.smooth);
+  if (arguments.study.unload) {
+    (void)imaged_load_of(study);
+  } else {
+    remark_on_imaged_load(study, "fit");
+  }
+  const Measurement measurement = read_measurement(study);
+  StudyFitOptions options = options_of(arguments, study);
+  if (loop) options.work = measured_work(*loop, measurement, *arguments.energy);
+  fmt::print(stderr, "Fitting {} in {} frames.\n",
+             measurement.tags.empty() ? fmt::format("{} 3-D points", measurement.points.size())
+                                      : fmt::format("{} tag points", measurement.tags.size()),
+             measurement.frames.size());
+  std::vector<Finding> findings = examined(arguments, study, measurement);
+  std::ranges::copy(model_findings(study), std::back_inserter(findings));
+  if (has_error(findings)) return refuse_data(refused_fit(study, measurement, std::move(findings)), out);
+  if (arguments.checkpoint) {
+    require_output({*arguments.checkpoint, inputs_of(study), fit_file_mark, arguments.force});
+    options.on_checkpoint = [&](const FitRecord& reached) { write_fit_file(reached, *arguments.checkpoint); };
+  }
+  const Interruption interruption;
+  FitRecord record = fit_study(study, measurement, options);
+  record.findings = std::move(findings);
+  if (tracked) record.images = std::filesystem::weakly_canonical(*tracked).string();
+  fmt::print(stderr, "{} {} iterations, {} equilibrium solutions, {:.1f} s.\n", record.reason,
+             record.iterations, record.forward_solves, record.seconds);
+  if (arguments.output) write_fit_file(record, *arguments.output);
+  print_result(record, arguments, out);
   const bool returned = !arguments.study.unload || (record.unloaded && record.unloaded->returned);
   return record.converged && !ended_on_bound(record) && returned ? ExitCode::done : ExitCode::negative;
 }

@@ -6,6 +6,7 @@
 
 #include "estimator/effects/effect.hpp"
 #include "estimator/explain/imaging/explain_field.hpp"
+#include "estimator/explain/verdict/verdict.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole::explain {
@@ -36,10 +37,15 @@ Ids shared(const Ids& ids) {
   return both;
 }
 
-/// Those of the sets that are left open whose effects in both data are these.
+/// Those of the sets that are left open whose effects in both data are these; nothing at all is not one of them, which the other data
+/// exclude. If none but the best is left it is named, and what was said and proposed of the others goes.
 void keep_agreeing(Explanation& explanation, const Ids& agreed) {
   std::erase_if(explanation.ambiguous_with, [&](const Ids& ids) { return shared(ids) != agreed; });
-  if (explanation.ambiguous_with.empty()) explanation.verdict = Verdict::named;
+  if (!explanation.ambiguous_with.empty()) return;
+  explanation.verdict = Verdict::named;
+  explanation.confidence = {};
+  explanation.next_experiment = {};
+  explanation.summary = summary_of(explanation);
 }
 
 /// Where one explanation is named by an effect that shows in both data, and that is the best of what the other leaves open, the other's

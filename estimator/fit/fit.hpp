@@ -7,7 +7,7 @@
 // The estimate is the maximum of the likelihood of tag points, 3-D points and frame pressures under their
 // stated normal errors (joint_problem.hpp). Standard errors are those of the joint problem, (JᵀJ)⁻¹, so that
 // they carry the pressures' errors; they trust the stated sigmas and are not rescaled by chi2/dof. With tracked tags
-// they are those of residuals that err alike within patches of 4 x 4 lines, where these are larger (Liang and Zeger 1986).
+// they are those of residuals that err alike within patches: sixteenths of a view, a quarter of its planes by a quarter of their length, where these are larger (Liang and Zeger 1986).
 // A robust fit's errors are those of an M-estimator: they come from the residuals' own spread. The 95 %
 // interval is symmetric in the coordinate of the value: for a positive one a factor up and down. Smooth regional
 // values have the posterior's standard deviation instead: data and smoothness together, the smoothness' own

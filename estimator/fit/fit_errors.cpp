@@ -253,6 +253,60 @@ std::optional<PressureByMotion> pressure_by_motion(const Frame& load, const Line
                           off / std::sqrt(1.0 + variance)};
 }
 
+/// Variances of the unknowns' coordinates after each step that adds to them.
+struct ErrorParts {
+  Eigen::VectorXd exact;          ///< with the pressures held at their estimates
+  Eigen::VectorXd of_pressures;   ///< share of the pressures in what the data leave
+  Eigen::VectorXd of_smoothness;  ///< data and smoothness
+  Eigen::VectorXd of_data;        ///< and patches
+  std::map<std::string, Eigen::VectorXd> considered;
+  Intervals intervals;
+};
+
+/// The values with their errors; rows and columns of the covariance become those of the values from those of their coordinates.
+void add_values(FitOutcome& outcome, const JointProblem& problem, const Eigen::VectorXd& q,
+                const ErrorParts& parts) {
+  for (Eigen::Index i = 0; i < problem.values(); ++i) {
+    const inference::Parameter& parameter = problem.space()[i];
+    const double variance = outcome.covariance(i, i), pressures = parts.of_pressures[i] * parts.of_data[i];
+    outcome.values.push_back(estimated(parameter, q[i], problem.space().bound_under(q, i), variance,
+                                       std::isfinite(variance) ? variance - pressures : parts.exact[i]));
+    if (variance > 0 && std::isfinite(outcome.values.back().se)) {
+      const auto share = [&](const char* source) {
+        const auto found = parts.considered.find(source);
+        return found == parts.considered.end() ? 0.0 : found->second[i] / variance;
+      };
+      outcome.values.back().shares = VarianceShares{(parts.of_data[i] - pressures) / variance,
+                                                    pressures / variance, share("fibres"), share("geometry")};
+    }
+    if (const auto found = parts.intervals.find(i); found != parts.intervals.end()) {
+      const auto [low, high] = found->second;  // without what patches and considered errors add
+      outcome.values.back().ci95 = interval(parameter, (low + high) / 2,
+                                            (high - low) / 2 * std::sqrt(variance / parts.of_smoothness[i]));
+    }
+    const double slope = parameter.slope(q[i]);
+    outcome.covariance.row(i) *= slope;
+    outcome.covariance.col(i) *= slope;
+  }
+}
+
+/// The frames with what their tags, whose residuals are `motion`, say of the pressure.
+void add_frames(FitOutcome& outcome, const JointProblem& problem, const Eigen::VectorXd& q,
+                const Eigen::VectorXd& motion, const LinearisedCost& cost, const Eigen::MatrixXd& curvature,
+                double spread) {
+  Eigen::Index reading = motion.size(), first = 0;
+  for (const JointProblem::LoadedFrame& frame : problem.frames()) {
+    const Eigen::Index rows = frame.residuals.size();
+    outcome.frames.push_back(estimated(frame, motion.segment(first, rows), q, outcome.covariance));
+    first += rows;
+    EstimatedFrame& added = outcome.frames.back();
+    if (frame.pressure_unknown)
+      added.by_motion = pressure_by_motion(frame.load, cost, reading++, curvature, spread);
+    else if (outcome.pressure_offset)
+      added.pressure_kPa -= outcome.pressure_offset->value_kPa;
+  }
+}
+
 }  // namespace
 
 QuadraticModel quadratic_model(JointProblem& problem, const Eigen::VectorXd& q) {
@@ -316,38 +370,18 @@ Eigen::MatrixXd estimate_errors(FitOutcome& outcome, JointProblem& problem, cons
     outcome.offset_score = offset_score(problem, q, {cost.jacobian, cost.residuals, is_free, spread}, column);
   }
   // Smoothness and patches widen what is known with the pressures and without them alike.
-  const Eigen::VectorXd exact = variances_at_exact_pressure(problem, cost.jacobian, is_free, excess);
-  const Eigen::VectorXd of_pressures =
-      1.0 - exact.cwiseQuotient(outcome.covariance.diagonal().head(exact.size())).array().min(1.0);
-  const Intervals intervals = estimate_smoothness(outcome, problem, q, options, is_free, excess);
-  const Eigen::VectorXd of_smoothness = outcome.covariance.diagonal();
+  ErrorParts parts;
+  parts.exact = variances_at_exact_pressure(problem, cost.jacobian, is_free, excess);
+  parts.of_pressures =
+      1.0 -
+      parts.exact.cwiseQuotient(outcome.covariance.diagonal().head(parts.exact.size())).array().min(1.0);
+  parts.intervals = estimate_smoothness(outcome, problem, q, options, is_free, excess);
+  parts.of_smoothness = outcome.covariance.diagonal();
   widen_for_patches(outcome, problem, cost, is_free);
-  const Eigen::VectorXd of_data = outcome.covariance.diagonal();
-  const std::map<std::string, Eigen::VectorXd> considered =
-      consider_errors(outcome, problem, cost, curvature.matrix);
-  Eigen::MatrixXd in_coordinates = outcome.covariance;
-  for (Eigen::Index i = 0; i < problem.values(); ++i) {
-    const inference::Parameter& parameter = problem.space()[i];
-    const double variance = outcome.covariance(i, i), pressures = of_pressures[i] * of_data[i];
-    outcome.values.push_back(estimated(parameter, q[i], problem.space().bound_under(q, i), variance,
-                                       std::isfinite(variance) ? variance - pressures : exact[i]));
-    if (variance > 0 && std::isfinite(outcome.values.back().se)) {
-      const auto share = [&](const char* source) {
-        const auto found = considered.find(source);
-        return found == considered.end() ? 0.0 : found->second[i] / variance;
-      };
-      outcome.values.back().shares = VarianceShares{(of_data[i] - pressures) / variance, pressures / variance,
-                                                    share("fibres"), share("geometry")};
-    }
-    if (const auto found = intervals.find(i); found != intervals.end()) {
-      const auto [low, high] = found->second;  // without what patches and considered errors add
-      outcome.values.back().ci95 =
-          interval(parameter, (low + high) / 2, (high - low) / 2 * std::sqrt(variance / of_smoothness[i]));
-    }
-    const double slope = parameter.slope(q[i]);
-    outcome.covariance.row(i) *= slope;
-    outcome.covariance.col(i) *= slope;
-  }
+  parts.of_data = outcome.covariance.diagonal();
+  parts.considered = consider_errors(outcome, problem, cost, curvature.matrix);
+  const Eigen::MatrixXd in_coordinates = outcome.covariance;
+  add_values(outcome, problem, q, parts);
   if (const auto offset = problem.offset_unknown())
     outcome.pressure_offset = PressureOffset{q[*offset], std::sqrt(outcome.covariance(*offset, *offset))};
   if (problem.was_imaged_loaded()) {
@@ -356,17 +390,7 @@ Eigen::MatrixXd estimate_errors(FitOutcome& outcome, JointProblem& problem, cons
         problem.imaged_pressure_at(q), unknown ? std::sqrt(outcome.covariance(*unknown, *unknown)) : 0.0};
   }
   if (problem.work()) outcome.stored_energy_mJ = problem.stored_energy_mJ();
-  Eigen::Index reading = motion.size(), first = 0;
-  for (const JointProblem::LoadedFrame& frame : problem.frames()) {
-    const Eigen::Index rows = frame.residuals.size();
-    outcome.frames.push_back(estimated(frame, motion.segment(first, rows), q, outcome.covariance));
-    first += rows;
-    EstimatedFrame& added = outcome.frames.back();
-    if (frame.pressure_unknown)
-      added.by_motion = pressure_by_motion(frame.load, cost, reading++, curvature.matrix, spread);
-    else if (outcome.pressure_offset)
-      added.pressure_kPa -= outcome.pressure_offset->value_kPa;
-  }
+  add_frames(outcome, problem, q, motion, cost, curvature.matrix, spread);
   return in_coordinates;
 }
 

@@ -4,7 +4,8 @@
 // A measured frame pressure has an error of its own, which a fit must not mistake for stiffness: each loaded
 // frame's true pressure is an unknown with its measurement as a prior. With q = (values, pressures),
 //
-//   minimise  1/2 sum_frames |r_frame(values, P_frame)|^2  +  1/2 sum_frames ((P_frame - measured) / sigma)^2
+//   minimise  1/2 sum_frames |r_frame(values, P_frame)|^2  +  1/2 sum_frames ((P_frame + offset - measured) / sigma)^2
+//             +  1/2 (offset / sigma_offset)^2  +  1/2 sum (tag planes / sigma_planes)^2  +  work and smoothness, below
 //
 // All measurements may be off by a common offset, one more unknown with a prior about zero; a pressure read in the
 // undeformed frame 0 is a measurement of it. Tag planes that were found in images are unknowns too

@@ -71,6 +71,7 @@ SessionRun session_run(RecordedRun&& run, const std::string& name) {
   SessionRun read;
   const FoundMotion found = find_motion(run);
   read.drive.motion = found.motion;
+  if (!found.explained) read.smoothed_mL = found.worst_mL;
   read.drive.start_s = run.pressure.time_s.front();
   read.drive.end_s = run.pressure.time_s.back();
   read.drive.place.name = name;

@@ -27,6 +27,8 @@ struct SessionRun {
   std::vector<double> sample_s;
   std::map<Channel, std::vector<double>> pressure_kPa;  ///< NaN where a gap is declared
   std::vector<GatedVolume> volumes;
+  double smoothed_mL =
+      0.0;  ///< how far drive.motion is from counts that no known motion follows; 0: one does
 };
 
 /// Beyond these the controller refuses a motion.

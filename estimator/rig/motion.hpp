@@ -13,7 +13,7 @@
 // Volume, flow and acceleration are differences of the strokes' exact integrals over W. `find_motion` tries the
 // waveforms of /protocol/segments first, then cycles of them that turn at other phases and are rounded otherwise (another
 // maker's sawtooth), strokes fitted to the counts elsewhere, and W from none to 0.1 s, and accepts what stays within a
-// step everywhere; what nothing explains is smoothed, and said so.
+// step everywhere; what nothing explains is smoothed, and `explain` says so.
 
 #include <vector>
 

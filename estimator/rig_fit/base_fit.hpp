@@ -1,5 +1,5 @@
 #pragma once
-// The rig's model without effects, fitted to a session's features.
+// The declared rig with the effects that the study states: modulus and offsets fitted to a session's features, tolerances zero.
 
 #include "estimator/rig_fit/session_problem.hpp"
 

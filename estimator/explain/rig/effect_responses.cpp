@@ -79,6 +79,128 @@ bool is_in_proportion(const Sized& one, const Sized& larger, const VectorXd& sca
   return (b - a).norm() < within * a.norm();
 }
 
+/// Simulates effects one by one, at sizes that are set ever closer where the changes that they make differ in shape.
+class ResponseScan {
+ public:
+  ResponseScan(const rig::SessionProblem& problem, const rig::LinearisedModel& known, const VectorXd& scale)
+      : problem_(problem), known_(known), scale_(scale), neutral_of_(problem.model(known.at)) {
+    const auto is_in_base = [&](const Effect* effect) {
+      return std::ranges::any_of(known.at.terms, [&](const ModelTerm& in) { return in.effect == effect; });
+    };
+    for (const Effect* effect : problem.session().effects.of_rig())
+      if (effect->fits(problem.family()) && effect->change_points() == ChangePoints::none &&
+          !is_in_base(effect))
+        std::ranges::copy(variants_of(*effect), std::back_inserter(variants_));
+    seen_ = magnitudes(problem.features(), known.misfit(problem).cwiseQuotient(scale)).normalized();
+  }
+
+  void scan_first_sizes() {
+    std::vector<Wanted> wanted;
+    for (size_t v = 0; v < variants_.size(); ++v)
+      for (const double size : first_sizes)
+        wanted.push_back({v, size});
+    simulate(wanted);
+  }
+
+  /// A quarter of the smallest size: in proportion to it, where four times as much is.
+  void add_smaller_sizes() {
+    std::vector<Wanted> wanted;
+    for (size_t i = 0, count = all_.size(); i < count; ++i) {
+      if (all_[i].size != first_sizes[0]) continue;
+      const size_t v = all_[i].variant;
+      const double size = smaller * first_sizes[0];
+      if (i + 1 < count && all_[i + 1].variant == v && all_[i + 1].size == first_sizes[1] &&
+          is_in_proportion(all_[i], all_[i + 1], scale_)) {
+        Sized small = all_[i];
+        small.size = size;
+        small.response.values = variants_[v].values(variants_[v].effect->neutral(neutral_of_), size);
+        small.response.change *= smaller;
+        all_.push_back(std::move(small));
+      } else {
+        wanted.push_back({v, size});
+      }
+    }
+    simulate(wanted);
+  }
+
+  /// Sizes between neighbours whose changes differ in shape, the likely ones alone in later rounds. False: there are none.
+  bool halve_differing(size_t round) {
+    std::ranges::sort(all_, {}, [](const Sized& one) { return std::pair(one.variant, one.size); });
+    std::vector<Interval> differing;
+    for (size_t i = 0; i + 1 < all_.size(); ++i) {
+      if (all_[i].variant != all_[i + 1].variant) continue;
+      const VectorXd a = all_[i].response.change.cwiseQuotient(scale_);
+      const VectorXd b = all_[i + 1].response.change.cwiseQuotient(scale_);
+      if (b.norm() < visible || a.dot(b) > alike * a.norm() * b.norm()) continue;
+      differing.push_back({all_[i].variant, std::sqrt(all_[i].size * all_[i + 1].size),
+                           std::max(all_[i].likeness, all_[i + 1].likeness)});
+    }
+    std::ranges::sort(differing, [](const Interval& a, const Interval& b) {
+      return a.variant != b.variant ? a.variant < b.variant : a.likeness > b.likeness;
+    });
+    std::vector<Wanted> wanted;
+    for (size_t i = 0, rank = 0; i < differing.size(); ++i) {
+      rank = i > 0 && differing[i].variant == differing[i - 1].variant ? rank + 1 : 0;
+      if (round < halvings_everywhere || rank < likely_intervals)
+        wanted.push_back({differing[i].variant, differing[i].middle});
+    }
+    simulate(wanted);
+    return !wanted.empty();
+  }
+
+  [[nodiscard]] std::vector<Response> take() {
+    std::vector<Response> list;
+    for (Sized& one : all_)
+      list.push_back(std::move(one.response));
+    return list;
+  }
+
+ private:
+  struct Wanted {
+    size_t variant;
+    double size;
+  };
+  /// Between two sizes.
+  struct Interval {
+    size_t variant;
+    double middle, likeness;
+  };
+
+  /// Adds those that have values within their bounds and a solution.
+  void simulate(const std::vector<Wanted>& wanted) {
+    if (wanted.empty()) return;
+    std::vector<SessionModel> models{known_.at};
+    std::vector<bool> same_plant{true};
+    std::vector<Sized> made;
+    for (const auto& [v, size] : wanted) {
+      const Variant& variant = variants_[v];
+      const std::vector<double> values = variant.values(variant.effect->neutral(neutral_of_), size);
+      if (values.empty()) continue;
+      made.push_back({v, size, {{variant.effect, {}}, values, {}}});
+      models.push_back(known_.at);
+      models.back().terms.push_back({variant.effect, {}});
+      models.back().values.insert(models.back().values.end(), values.begin(), values.end());
+      same_plant.push_back(variant.effect->stage() == Stage::sensors);
+    }
+    const Eigen::MatrixXd shown = problem_.shown(models, same_plant);
+    for (size_t i = 0; i < made.size(); ++i) {
+      made[i].response.change = shown.col(static_cast<Eigen::Index>(i + 1)) - known_.there;
+      const VectorXd own = magnitudes(problem_.features(), made[i].response.change.cwiseQuotient(scale_));
+      made[i].likeness = own.dot(seen_) / std::max(own.norm(), 1e-9);
+    }
+    std::erase_if(made, [](const Sized& one) { return !one.response.change.allFinite(); });
+    std::ranges::move(made, std::back_inserter(all_));
+  }
+
+  const rig::SessionProblem& problem_;
+  const rig::LinearisedModel& known_;
+  const VectorXd& scale_;
+  const rig::RigModel neutral_of_;
+  std::vector<Variant> variants_;
+  VectorXd seen_;  ///< the misfit's sizes
+  std::vector<Sized> all_;
+};
+
 }  // namespace
 
 bool is_amplitude(const Effect& effect, size_t parameter) {
@@ -103,93 +225,12 @@ std::vector<double> sized_values(const Effect& effect, const std::vector<double>
 
 std::vector<Response> effect_responses(const rig::SessionProblem& problem, const rig::LinearisedModel& known,
                                        const VectorXd& scale) {
-  const SessionModel& base = known.at;
-  std::vector<Variant> variants;
-  for (const Effect* effect : problem.session().effects.of_rig())
-    if (effect->fits(problem.family()) && effect->change_points() == ChangePoints::none &&
-        std::ranges::none_of(base.terms, [&](const ModelTerm& in) { return in.effect == effect; }))
-      std::ranges::copy(variants_of(*effect), std::back_inserter(variants));
-  const VectorXd seen =
-      magnitudes(problem.features(), known.misfit(problem).cwiseQuotient(scale)).normalized();
-  const rig::RigModel neutral_of = problem.model(base);
-  const auto simulate = [&](const std::vector<std::pair<size_t, double>>& wanted) {
-    std::vector<SessionModel> models{base};
-    std::vector<bool> same_plant{true};
-    std::vector<Sized> made;
-    for (const auto& [v, size] : wanted) {
-      const Variant& variant = variants[v];
-      const std::vector<double> values = variant.values(variant.effect->neutral(neutral_of), size);
-      if (values.empty()) continue;
-      made.push_back({v, size, {{variant.effect, {}}, values, {}}});
-      models.push_back(base);
-      models.back().terms.push_back({variant.effect, {}});
-      models.back().values.insert(models.back().values.end(), values.begin(), values.end());
-      same_plant.push_back(variant.effect->stage() == Stage::sensors);
-    }
-    const Eigen::MatrixXd shown = problem.shown(models, same_plant);
-    for (size_t i = 0; i < made.size(); ++i) {
-      made[i].response.change = shown.col(static_cast<Eigen::Index>(i + 1)) - known.there;
-      const VectorXd own = magnitudes(problem.features(), made[i].response.change.cwiseQuotient(scale));
-      made[i].likeness = own.dot(seen) / std::max(own.norm(), 1e-9);
-    }
-    std::erase_if(made, [](const Sized& one) { return !one.response.change.allFinite(); });
-    return made;
-  };
-  std::vector<std::pair<size_t, double>> wanted;
-  for (size_t v = 0; v < variants.size(); ++v)
-    for (const double size : first_sizes)
-      wanted.emplace_back(v, size);
-  std::vector<Sized> all = simulate(wanted);
-  // A quarter of the smallest size: in proportion to it, where four times as much is.
-  wanted.clear();
-  for (size_t i = 0, count = all.size(); i < count; ++i) {
-    if (all[i].size != first_sizes[0]) continue;
-    const auto [v, size] = std::pair(all[i].variant, smaller * first_sizes[0]);
-    if (i + 1 < count && all[i + 1].variant == v && all[i + 1].size == first_sizes[1] &&
-        is_in_proportion(all[i], all[i + 1], scale)) {
-      Sized small = all[i];
-      small.size = size;
-      small.response.values = variants[v].values(variants[v].effect->neutral(neutral_of), size);
-      small.response.change *= smaller;
-      all.push_back(std::move(small));
-    } else {
-      wanted.emplace_back(v, size);
-    }
+  ResponseScan scan(problem, known, scale);
+  scan.scan_first_sizes();
+  scan.add_smaller_sizes();
+  for (size_t round = 0; round < most_halvings && scan.halve_differing(round); ++round) {
   }
-  std::vector<Sized> small = simulate(wanted);
-  std::ranges::move(small, std::back_inserter(all));
-  for (size_t round = 0; round < most_halvings; ++round) {
-    std::ranges::sort(all, {}, [](const Sized& one) { return std::pair(one.variant, one.size); });
-    struct Interval {
-      size_t variant;
-      double middle, likeness;
-    };
-    std::vector<Interval> differing;
-    for (size_t i = 0; i + 1 < all.size(); ++i) {
-      if (all[i].variant != all[i + 1].variant) continue;
-      const VectorXd a = all[i].response.change.cwiseQuotient(scale);
-      const VectorXd b = all[i + 1].response.change.cwiseQuotient(scale);
-      if (b.norm() < visible || a.dot(b) > alike * a.norm() * b.norm()) continue;
-      differing.push_back({all[i].variant, std::sqrt(all[i].size * all[i + 1].size),
-                           std::max(all[i].likeness, all[i + 1].likeness)});
-    }
-    std::ranges::sort(differing, [](const Interval& a, const Interval& b) {
-      return a.variant != b.variant ? a.variant < b.variant : a.likeness > b.likeness;
-    });
-    wanted.clear();
-    for (size_t i = 0, rank = 0; i < differing.size(); ++i) {
-      rank = i > 0 && differing[i].variant == differing[i - 1].variant ? rank + 1 : 0;
-      if (round < halvings_everywhere || rank < likely_intervals)
-        wanted.emplace_back(differing[i].variant, differing[i].middle);
-    }
-    if (wanted.empty()) break;
-    std::vector<Sized> more = simulate(wanted);
-    std::ranges::move(more, std::back_inserter(all));
-  }
-  std::vector<Response> list;
-  for (Sized& one : all)
-    list.push_back(std::move(one.response));
-  return list;
+  return scan.take();
 }
 
 }  // namespace diastole::explain

@@ -168,6 +168,22 @@ std::string doubt_of_units(const rig::SessionProblem& problem) {
       shown_kPa, measured_kPa);
 }
 
+/// A sentence where the piston's motion is known roughly only.
+std::string doubt_of_motion(const rig::Session& session) {
+  std::string runs;
+  double worst_mL = 0.0;
+  for (const rig::SessionRun& run : session.runs) {
+    if (run.smoothed_mL == 0.0) continue;
+    runs += (runs.empty() ? "" : ", ") + run.drive.place.name;
+    worst_mL = std::max(worst_mL, run.smoothed_mL);
+  }
+  if (runs.empty()) return {};
+  return fmt::format(
+      " No motion that is known follows the counted steps of {}: they were smoothed, and are up to {:.2g} mL "
+      "off, which may look like an effect of the drive.",
+      runs, worst_mL);
+}
+
 /// What its references say of the rig, and the problem with it.
 ReferenceSummary take_reference(const Study& study, const Reference& reference,
                                 rig::SessionProblem& problem) {
@@ -184,6 +200,81 @@ ReferenceSummary take_reference(const Study& study, const Reference& reference,
   }
   summary.departures = departures(problem, problem.prior({}).mean);
   return summary;
+}
+
+bool is_something_found(const SetVerdict& verdict) {
+  return verdict.verdict == Verdict::named || verdict.verdict == Verdict::ambiguous;
+}
+
+/// The one that was found; the rig without effects otherwise.
+const EffectSet& explaining_set(const WeighedSets& search, const SetVerdict& verdict) {
+  return search.sets[is_something_found(verdict) ? verdict.chosen : verdict.plain];
+}
+
+/// The verdict and what it rests on, as the explanation holds them.
+Explanation described(const Study& study, const rig::SessionProblem& problem, const WeighedSets& search,
+                      const SetVerdict& verdict, bool from_reference) {
+  const EffectSet& plain = search.sets[verdict.plain];
+  const bool is_found = is_something_found(verdict);
+  const EffectSet& chosen = search.sets[verdict.chosen];
+  const EffectSet& after = explaining_set(search, verdict);
+  Explanation out;
+  out.study = study.file.string();
+  out.verdict = verdict.verdict;
+  out.confidence = verdict.confidence;
+  out.model_error = model_error_of(problem, chosen, from_reference);
+  out.departures = departures(problem, problem.tolerances(chosen.model));
+  for (const rig::CycleScatter& scatter : verdict.scatter)
+    out.cycle_scatter.push_back(
+        {std::string(rig::name_of(scatter.signal)), 1e3 * scatter.rms_kPa, 1e3 * scatter.noise_kPa,
+         100.0 * scatter.rms_kPa / problem.error().range[static_cast<size_t>(scatter.signal)]});
+  out.hints = verdict.hints;
+  out.searches = verdict.searches;
+  out.converged = is_settled(out.searches);
+  out.ambiguous_with = verdict.ambiguous_with;
+  if (is_found) out.effects = found_effects(problem, chosen, verdict);
+  out.gap = held_out_gap(problem, plain, after);
+  if (is_found) {
+    out.where = misfits(problem, plain, chosen);
+    if (const auto port = common_port(problem.session().effects, out);
+        port && out.verdict == Verdict::ambiguous)
+      for (Misfit& place : out.where)
+        place.port = *port;
+  } else if (out.verdict == Verdict::unexplained) {
+    EffectSet expected = plain;
+    expected.evidence.variance = problem.error().variance(problem.error().prior.share);
+    out.where = misfits(problem, plain, expected);
+  }
+  if (verdict.tone) {
+    const auto place = verdict.is_tone_alone ? out.where.begin() : out.where.end();
+    out.where.insert(place, misfit_of(*verdict.tone, problem.session()));
+  }
+  out.evidence = candidates(problem.session().effects, search, verdict);
+  if (!out.effects.empty()) out.shifts = parameter_shifts(problem, plain, chosen);
+  out.steps = steps_of(plain, after);
+  out.traces = traces(problem, plain, after);
+  return out;
+}
+
+/// What may follow a verdict: a law that the library lacks, and the next experiment. Ctrl-C ends it and keeps the verdict.
+void learn_and_propose(Explanation& out, const Study& study, const ExplainOptions& options,
+                       const rig::SessionProblem& problem, const WeighedSets& search,
+                       const SetVerdict& verdict, const ErrorKnowledge& error) {
+  const auto report = [&](std::string_view what) { options.report(std::string(what)); };
+  try {
+    if (options.learn && out.verdict == Verdict::none) {
+      out.not_learned = "nothing exceeds the model's own error";
+    } else if (options.learn || (out.verdict == Verdict::unexplained && !verdict.is_tone_alone)) {
+      out.not_learned = "it was interrupted";
+      Learning learning = learn_term(problem, explaining_set(search, verdict), error, report);
+      out.learned = std::move(learning.term);
+      out.not_learned = std::move(learning.lacks);
+    }
+    options.report("designing the next experiment");
+    if (options.propose) out.next_experiment = next_experiment(study, problem, search, verdict, out);
+  } catch (const Interrupted&) {
+    out.summary = "Interrupted after the verdict. ";
+  }
 }
 
 }  // namespace
@@ -216,65 +307,14 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   }
 
   options.report("judging");
-  const bool from_reference = learnt.has_value();
-  const ErrorKnowledge error{from_reference,
+  const ErrorKnowledge error{learnt.has_value(),
                              learnt ? learnt->termination : inference::Termination::converged};
   const SetVerdict verdict = judge_sets(problem, search, error);
-  const EffectSet& plain = search.sets[verdict.plain];
-  const bool is_found = verdict.verdict == Verdict::named || verdict.verdict == Verdict::ambiguous;
-  const EffectSet& chosen = search.sets[verdict.chosen];
-  const EffectSet& after = is_found ? chosen : plain;
-  Explanation out;
-  out.study = study.file.string();
-  out.verdict = verdict.verdict;
-  out.confidence = verdict.confidence;
-  out.model_error = model_error_of(problem, chosen, from_reference);
+  Explanation out = described(study, problem, search, verdict, error.from_reference);
   out.reference = reference;
-  out.departures = departures(problem, problem.tolerances(chosen.model));
-  for (const rig::CycleScatter& scatter : verdict.scatter)
-    out.cycle_scatter.push_back(
-        {std::string(rig::name_of(scatter.signal)), 1e3 * scatter.rms_kPa, 1e3 * scatter.noise_kPa,
-         100.0 * scatter.rms_kPa / problem.error().range[static_cast<size_t>(scatter.signal)]});
-  out.hints = verdict.hints;
-  out.searches = verdict.searches;
-  out.converged = is_settled(out.searches);
-  out.ambiguous_with = verdict.ambiguous_with;
-  if (is_found) out.effects = found_effects(problem, chosen, verdict);
-  out.gap = held_out_gap(problem, plain, after);
-  if (is_found) {
-    out.where = misfits(problem, plain, chosen);
-    if (const auto port = common_port(session.effects, out); port && out.verdict == Verdict::ambiguous)
-      for (Misfit& place : out.where)
-        place.port = *port;
-  } else if (out.verdict == Verdict::unexplained) {
-    EffectSet expected = plain;
-    expected.evidence.variance = problem.error().variance(problem.error().prior.share);
-    out.where = misfits(problem, plain, expected);
-  }
-  if (verdict.tone) {
-    const auto place = verdict.is_tone_alone ? out.where.begin() : out.where.end();
-    out.where.insert(place, misfit_of(*verdict.tone, session));
-  }
-  out.evidence = candidates(session.effects, search, verdict);
-  if (!out.effects.empty()) out.shifts = parameter_shifts(problem, plain, chosen);
-  out.steps = steps_of(plain, after);
-  out.traces = traces(problem, plain, after);
-  try {
-    if (options.learn && out.verdict == Verdict::none) {
-      out.not_learned = "nothing exceeds the model's own error";
-    } else if (options.learn || (out.verdict == Verdict::unexplained && !verdict.is_tone_alone)) {
-      out.not_learned = "it was interrupted";
-      Learning learning = learn_term(problem, after, error, report);
-      out.learned = std::move(learning.term);
-      out.not_learned = std::move(learning.lacks);
-    }
-    options.report("designing the next experiment");
-    if (options.propose) out.next_experiment = next_experiment(study, problem, search, verdict, out);
-  } catch (const Interrupted&) {
-    out.summary = "Interrupted after the verdict. ";
-  }
+  learn_and_propose(out, study, options, problem, search, verdict, error);
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-  out.summary += summary_of(out) + doubt_of_units(problem);
+  out.summary += summary_of(out) + doubt_of_units(problem) + doubt_of_motion(session);
   if (verdict.tone)
     out.summary += fmt::format(
         " The cavity's pressure holds a tone near {:.1f} Hz, {:.0f} Pa RMS or more, that no cycle makes: "

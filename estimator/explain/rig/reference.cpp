@@ -89,6 +89,8 @@ struct Fitted {
   }
 };
 
+using Fits = std::vector<std::unique_ptr<Fitted>>;
+
 bool is_of_specimen(const Nuisance& nuisance) {
   return nuisance.name.starts_with("gel_") || nuisance.name == "inner_radius";
 }
@@ -103,8 +105,7 @@ void widen(Knowledge& known, const std::vector<Nuisance>& list) {
 
 /// What all sessions teach, one after the other. Far from what is declared a search ends early: each pass starts where the
 /// one before ended, with nothing known again.
-Knowledge learn_tolerances(const std::vector<std::unique_ptr<Fitted>>& fits,
-                           const std::function<void(const std::string&)>& report) {
+Knowledge learn_tolerances(const Fits& fits, const std::function<void(const std::string&)>& report) {
   constexpr int passes = 4;
   const auto& list = fits.front()->problem.nuisances();
   const auto count = static_cast<Index>(list.size() - basic_nuisances);
@@ -124,7 +125,7 @@ Knowledge learn_tolerances(const std::vector<std::unique_ptr<Fitted>>& fits,
 }
 
 /// One feature's difference of two references, of the segments that both hold.
-Shares differing_shares(const std::vector<std::unique_ptr<Fitted>>& fits, const Reference& known) {
+Shares differing_shares(const Fits& fits, const Reference& known) {
   if (fits.size() < 2) {
     Shares shares = known.all;
     for (double& share : shares)
@@ -158,46 +159,10 @@ Shares differing_shares(const std::vector<std::unique_ptr<Fitted>>& fits, const 
       .shares;
 }
 
-}  // namespace
-
-void require_rig_of(const Reference& reference, const rig::Session& session, const Study& study) {
-  const rig::Hose& hose = session.base.hose;
-  if (reference.hose_length_m == 0.0 ||
-      (hose.length_m == reference.hose_length_m && hose.bore_mm == reference.hose_bore_mm))
-    return;
-  throw InputError(
-      {.file = study.file.string(),
-       .place = "attributes /rig hose_length_m, hose_bore_mm of its runs",
-       .problem = fmt::format("are {:g} m and {:g} mm, and those of the reference {:g} m and {:g} mm",
-                              hose.length_m, hose.bore_mm, reference.hose_length_m, reference.hose_bore_mm),
-       .remedy = "A reference is a session of the same rig: name one, or leave [data] reference out."});
-}
-
-Reference learn_reference(const std::vector<Study>& studies, size_t threads,
-                          const std::function<void(std::string_view)>& progress) {
-  const auto report = [&](const std::string& what) {
-    if (progress) progress(what);
-  };
-  Reference out;
-  std::vector<std::unique_ptr<Fitted>> fits;
-  for (const Study& study : studies)
-    fits.push_back(std::make_unique<Fitted>(study, threads));
-  out.sessions = fits.size();
-  out.hose_length_m = fits.front()->session.base.hose.length_m;
-  out.hose_bore_mm = fits.front()->session.base.hose.bore_mm;
-  for (const auto& fit : fits)
-    require_rig_of(out, fit->session, fit->study);
-  const Knowledge known = learn_tolerances(fits, report);
-  for (const Nuisance& nuisance : std::span(fits.front()->problem.nuisances()).subspan(basic_nuisances))
-    out.tolerances.push_back(nuisance.name);
-  out.mean = known.mean;
-  out.covariance = known.covariance;
-  report("learning what the rig's model leaves");
+/// How large the misfit is that the fits leave: shares of all, and what of it each signal holds.
+void measure_misfit(const Fits& fits, Reference& out) {
   std::array<double, signal_count> squares{}, rows{};
   for (const auto& fit : fits) {
-    fit->fit(known, known.mean);
-    if (inference::is_settled(out.termination) && !inference::is_settled(fit->termination))
-      out.termination = fit->termination;
     for (size_t g = 0; g < error_groups; ++g)
       out.all[g] += std::pow(fit->evidence.shares[g], 2) / static_cast<double>(fits.size());
     for (const FeatureBlock& block : fit->problem.features().blocks()) {
@@ -214,10 +179,10 @@ Reference learn_reference(const std::vector<Study>& studies, size_t threads,
     out.rms[s] = rows[s] > 0.0 ? std::sqrt(squares[s] / rows[s]) : 0.0;
     out.percent_of_range[s] = rows[s] > 0.0 ? 100.0 * out.rms[s] / out.percent_of_range[s] : 0.0;
   }
-  out.again = differing_shares(fits, out);
-  for (size_t g = 0; g < error_groups; ++g)
-    out.again[g] = std::min(out.again[g], out.all[g]);
-  // The common misfit of each segment, shrunk to what is known of it.
+}
+
+/// The common misfit of each segment, shrunk to what is known of it.
+void learn_common_misfit(const Fits& fits, Reference& out) {
   struct Sum {
     VectorXd misfit, noise, unit;
     std::vector<ErrorGroup> group;
@@ -255,6 +220,53 @@ Reference learn_reference(const std::vector<Study>& studies, size_t threads,
       segment.noise[i] = common * (1.0 - part);
     }
   }
+}
+
+}  // namespace
+
+void require_rig_of(const Reference& reference, const rig::Session& session, const Study& study) {
+  const rig::Hose& hose = session.base.hose;
+  if (reference.hose_length_m == 0.0 ||
+      (hose.length_m == reference.hose_length_m && hose.bore_mm == reference.hose_bore_mm))
+    return;
+  throw InputError(
+      {.file = study.file.string(),
+       .place = "attributes /rig hose_length_m, hose_bore_mm of its runs",
+       .problem = fmt::format("are {:g} m and {:g} mm, and those of the reference {:g} m and {:g} mm",
+                              hose.length_m, hose.bore_mm, reference.hose_length_m, reference.hose_bore_mm),
+       .remedy = "A reference is a session of the same rig: name one, or leave [data] reference out."});
+}
+
+Reference learn_reference(const std::vector<Study>& studies, size_t threads,
+                          const std::function<void(std::string_view)>& progress) {
+  const auto report = [&](const std::string& what) {
+    if (progress) progress(what);
+  };
+  Reference out;
+  Fits fits;
+  for (const Study& study : studies)
+    fits.push_back(std::make_unique<Fitted>(study, threads));
+  out.sessions = fits.size();
+  out.hose_length_m = fits.front()->session.base.hose.length_m;
+  out.hose_bore_mm = fits.front()->session.base.hose.bore_mm;
+  for (const auto& fit : fits)
+    require_rig_of(out, fit->session, fit->study);
+  const Knowledge known = learn_tolerances(fits, report);
+  for (const Nuisance& nuisance : std::span(fits.front()->problem.nuisances()).subspan(basic_nuisances))
+    out.tolerances.push_back(nuisance.name);
+  out.mean = known.mean;
+  out.covariance = known.covariance;
+  report("learning what the rig's model leaves");
+  for (const auto& fit : fits) {
+    fit->fit(known, known.mean);
+    if (inference::is_settled(out.termination) && !inference::is_settled(fit->termination))
+      out.termination = fit->termination;
+  }
+  measure_misfit(fits, out);
+  out.again = differing_shares(fits, out);
+  for (size_t g = 0; g < error_groups; ++g)
+    out.again[g] = std::min(out.again[g], out.all[g]);
+  learn_common_misfit(fits, out);
   return out;
 }
 

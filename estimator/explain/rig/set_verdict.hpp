@@ -29,6 +29,16 @@ struct ErrorKnowledge {
   [[nodiscard]] double least_size() const { return from_reference ? 1.5 : 2.0; }
 };
 
+/// The rules, in this order. A set stands for all that differ from it by hints alone: effects that are smaller than `least_size` times
+/// the model's error or than a tenth of the largest one, or that tolerances make as well.
+///
+///   unexplained  a part of the model's error, or of the rig, is as far off in 2.3 % by chance, or equal cycles differ as seldom as in
+///                0.1 %, or a search that the verdict rests on did not settle: of the rig without effects, of the set, of the reference
+///   ambiguous    the leading set has less than nine tenths; the others are those with a twentieth or more
+///   ambiguous    with nothing: its prediction of waveforms that were not fitted does not bear its prior odds, and does not exclude it
+///                either, or the rig without it is as it should be
+///   unexplained  the prediction excludes it, or a loud tone is left over
+///   named, none  else
 struct SetVerdict {
   Verdict verdict = Verdict::none;
   /// Of the sets that it names, or between which it is open. Of an unexplained one: that the leading set is wrong, from how seldom it

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/imaging/tracking/track_folder.hpp"
+#include "estimator/imaging/tracking/track_slices.hpp"
 
 namespace diastole::imaging {
 

@@ -205,6 +205,7 @@ class Emitter {
     if (std::abs(around.pull_mm) >
         std::max(most_pull_in_sigmas * around.pull_sigma_mm, most_pull_in_spacings * spacing_mm))
       return drop("the image is not where the line is: a jump, or motion too sharp");
+    // The line n x = d - w moves against w.
     const double own_mm = -place.gradient / std::max(place.information, 1e-300) / std::max(change, 0.2);
     if (!(std::abs(own_mm) < most_own_in_spacings * spacing_mm))
       return drop("the image is not where the line is: a jump, or motion too sharp");

@@ -50,6 +50,19 @@ TEST(RunsAndImages, AnEffectThatShowsInBothIsJudgedByBoth) {
   EXPECT_EQ(both.effects.size(), 1U);
 }
 
+TEST(RunsAndImages, WhatWasSaidOfSetsThatTheOtherDataExcludeGoesWithThem) {
+  Explanation runs = of(Verdict::ambiguous, {"radius-error"}, {{}});
+  runs.confidence = 0.8;
+  runs.next_experiment = NextExperiment{};
+  runs.summary = "Too weak to name.";
+  const Explanation both = merged(std::move(runs), of(Verdict::named, {"radius-error"}));
+  EXPECT_EQ(both.verdict, Verdict::named);
+  EXPECT_FALSE(both.confidence);
+  EXPECT_FALSE(both.next_experiment);
+  EXPECT_EQ(both.summary.find("Too weak"), std::string::npos);
+  EXPECT_NE(both.summary.find("lacks radius-error"), std::string::npos) << both.summary;
+}
+
 TEST(RunsAndImages, WhatTheyDisagreeOnStaysOpen) {
   const std::vector<std::vector<std::string>> others{{"stroke-gain"}};
   EXPECT_EQ(

@@ -1,4 +1,4 @@
-#include "estimator/imaging/tracking/track_folder.hpp"
+#include "estimator/imaging/tracking/track_slices.hpp"
 
 #include <fmt/format.h>
 

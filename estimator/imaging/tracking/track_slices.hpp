@@ -23,8 +23,8 @@ std::vector<TagView> tag_views(const ImageFolder& folder);
 /// How many slices are done; called by several threads, one at a time. What it throws ends the work.
 using SlicesDone = std::function<void(size_t done, size_t all)>;
 
-/// Of `tracked` the motion stays, and of each phase its noise and the tissue's depth; other maps, and covariances, are let go.
-/// Tracks all of them on `threads` threads. A slice in which nothing can be tracked is left out and reported in `problems`.
+/// Tracks all views on `threads` threads. Of each `TrackedSlice::tracked` the motion is kept, and of each phase its noise and the
+/// tissue's depth. A slice in which nothing can be tracked is left out and reported in `problems`.
 std::vector<TrackedSlice> track_views(std::vector<TagView> views, size_t threads,
                                       std::vector<Finding>& problems, const SlicesDone& progress = {});
 
