@@ -9,7 +9,9 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 export PATH="$bin_dir:$PATH" XDG_CACHE_HOME="$work/cache"
 "$source_dir/examples/heart/make" "$work/made"
-rm "$work"/made/heart.guide.csv "$work"/made/*.html # what a person may have changed is not replaced
+# What a person may have changed, and a volume in the run, are not replaced.
+rm "$work"/made/heart.guide.csv "$work"/made/*.html
+/usr/bin/python3 -c 'import h5py, sys; del h5py.File(sys.argv[1], "r+")["mr/flow"]' "$work/made/heart.run.h5"
 for document in "$@"; do
   folder=$work/$(basename "$document" .md)
   cp -r "$work/made" "$folder"
