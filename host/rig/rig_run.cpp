@@ -183,7 +183,8 @@ void RigService::do_run(RunOrder order, const Done& done) {
   } catch (const std::exception& error) {
     if (controller_->connected()) controller_->stop_now();  // nothing moves unrecorded
     result = {.end = "failed", .journal = path.string(), .problem = error.what()};
-    if (!outcome.first_error.empty()) result.problem += fmt::format(" ({})", outcome.first_error);
+    if (!outcome.first_error.empty())
+      result.problem += fmt::format(" (the run's first error: {})", outcome.first_error);
   }
   if (controller_->last_known().state == wire::State::armed) disarm(*controller_);
   spdlog::info("run {} ended: {}, {}", run.run_id, result.end,

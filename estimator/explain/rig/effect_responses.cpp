@@ -228,8 +228,9 @@ std::vector<Response> effect_responses(const rig::SessionProblem& problem, const
   ResponseScan scan(problem, known, scale);
   scan.scan_first_sizes();
   scan.add_smaller_sizes();
-  for (size_t round = 0; round < most_halvings && scan.halve_differing(round); ++round) {
-  }
+  size_t round = 0;
+  while (round < most_halvings && scan.halve_differing(round))
+    ++round;
   return scan.take();
 }
 

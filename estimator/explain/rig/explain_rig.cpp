@@ -259,8 +259,8 @@ Explanation described(const Study& study, const rig::SessionProblem& problem, co
 /// What may follow a verdict: a law that the library lacks, and the next experiment. Ctrl-C ends it and keeps the verdict.
 void learn_and_propose(Explanation& out, const Study& study, const ExplainOptions& options,
                        const rig::SessionProblem& problem, const WeighedSets& search,
-                       const SetVerdict& verdict, const ErrorKnowledge& error) {
-  const auto report = [&](std::string_view what) { options.report(std::string(what)); };
+                       const SetVerdict& verdict, const ErrorKnowledge& error,
+                       const std::function<void(std::string_view)>& report) {
   try {
     if (options.learn && out.verdict == Verdict::none) {
       out.not_learned = "nothing exceeds the model's own error";
@@ -270,7 +270,7 @@ void learn_and_propose(Explanation& out, const Study& study, const ExplainOption
       out.learned = std::move(learning.term);
       out.not_learned = std::move(learning.lacks);
     }
-    options.report("designing the next experiment");
+    report("designing the next experiment");
     if (options.propose) out.next_experiment = next_experiment(study, problem, search, verdict, out);
   } catch (const Interrupted&) {
     out.summary = "Interrupted after the verdict. ";
@@ -312,7 +312,7 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   const SetVerdict verdict = judge_sets(problem, search, error);
   Explanation out = described(study, problem, search, verdict, error.from_reference);
   out.reference = reference;
-  learn_and_propose(out, study, options, problem, search, verdict, error);
+  learn_and_propose(out, study, options, problem, search, verdict, error, report);
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   out.summary += summary_of(out) + doubt_of_units(problem) + doubt_of_motion(session);
   if (verdict.tone)
