@@ -128,7 +128,7 @@ class Scorer {
     return normal.dot(truth_.material_mm(phase, x_mm));
   }
 
-  void add(const imaging::TrackedSlice& slice, const imaging::TagPoint& point, bool with_harmonic) {
+  void add(const imaging::TrackedSlice& slice, const imaging::TrackedPoint& point, bool with_harmonic) {
     const Eigen::Vector3d x_mm = truth_.axes.transpose() * (point.x_mm - truth_.origin_mm);
     const Eigen::Vector3d normal = truth_.axes.transpose() * point.normal;
     const double plane_mm = point.plane_mm - point.normal.dot(truth_.origin_mm);
@@ -161,7 +161,7 @@ class Scorer {
     if (with_harmonic) add_harmonic(slice, point, phase, error, sign);
   }
 
-  void add_harmonic(const imaging::TrackedSlice& slice, const imaging::TagPoint& point, size_t phase,
+  void add_harmonic(const imaging::TrackedSlice& slice, const imaging::TrackedPoint& point, size_t phase,
                     double error_mm, double sign) {
     const imaging::SlicePlane& plane = slice.view.plane;
     const Eigen::Vector2d in_plane_mm = plane.in_plane_mm(point.x_mm);

@@ -224,8 +224,8 @@ std::string give_height(const RingSlice& ring) {
 
 }  // namespace
 
-TagPoint SpecimenPose::to_specimen(const TagPoint& patient) const {
-  TagPoint point = patient;
+TrackedPoint SpecimenPose::to_specimen(const TrackedPoint& patient) const {
+  TrackedPoint point = patient;
   point.normal = axes.transpose() * patient.normal;
   point.plane_mm = patient.plane_mm - patient.normal.dot(origin_mm);
   point.x_mm = axes.transpose() * (patient.x_mm - origin_mm);

@@ -17,7 +17,7 @@ struct SpecimenPose {
       Eigen::Matrix3d::Identity();  ///< columns: the specimen's x, y, z in patient coordinates
   std::string source;
 
-  [[nodiscard]] TagPoint to_specimen(const TagPoint& patient) const;
+  [[nodiscard]] TrackedPoint to_specimen(const TrackedPoint& patient) const;
 };
 
 /// Keys origin_mm, x_axis, y_axis, z_axis and, for the reader, kind. Throws InputError (file, line, remedy) unless the axes are

@@ -41,7 +41,7 @@ class Emitter {
  public:
   Emitter(const TagView& view, const TrackedView& tracked) : view_(view), tracked_(tracked) {}
 
-  TagPoints emit() {
+  TrackedPoints emit() {
     for (size_t k = 0; k < view_.images.size(); ++k) {
       for (size_t f = 0; f < tracked_.waves.size(); ++f)
         emit_lines(k, f);
@@ -209,7 +209,7 @@ class Emitter {
     const double own_mm = -place.gradient / std::max(place.information, 1e-300) / std::max(change, 0.2);
     if (!(std::abs(own_mm) < most_own_in_spacings * spacing_mm))
       return drop("the image is not where the line is: a jump, or motion too sharp");
-    TagPoint point;
+    TrackedPoint point;
     point.frame = view_.frames[k];
     point.direction = static_cast<int>(f);
     point.tag = place.tag;
@@ -286,7 +286,7 @@ class Emitter {
 
   const TagView& view_;
   const TrackedView& tracked_;
-  TagPoints points_;
+  TrackedPoints points_;
   // Of the phase and direction at hand:
   std::vector<Place> places_;
   Eigen::MatrixXd factor_;  // of the motion's covariance
@@ -294,7 +294,7 @@ class Emitter {
 
 }  // namespace
 
-TagPoints tag_points(const TagView& view, const TrackedView& tracked) {
+TrackedPoints tag_points(const TagView& view, const TrackedView& tracked) {
   return Emitter(view, tracked).emit();
 }
 

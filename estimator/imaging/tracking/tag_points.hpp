@@ -9,8 +9,9 @@
 
 namespace diastole::imaging {
 
-/// A place where a tag is seen: its material lay on the plane  normal . X = plane_mm  when the tags were made.
-struct TagPoint {
+/// A place where a tag is seen: its material lay on the plane  normal . X = plane_mm  when the tags were made. tags_file.hpp writes
+/// it, and TagPoint (estimator/io/measurement.hpp) is what a fit reads of that row.
+struct TrackedPoint {
   int frame = 0;
   int direction = 0;       ///< among the view's waves
   int tag = 0;             ///< number of its line
@@ -31,13 +32,13 @@ struct RejectedPoint {
   std::string reason;
 };
 
-struct TagPoints {
-  std::vector<TagPoint> points;
+struct TrackedPoints {
+  std::vector<TrackedPoint> points;
   std::vector<RejectedPoint> rejected;
   std::map<std::string, size_t> dropped;  ///< by reason
 };
 
 /// Evenly along every piece of line in tissue, about four fifths of the tag spacing apart.
-TagPoints tag_points(const TagView& view, const TrackedView& tracked);
+TrackedPoints tag_points(const TagView& view, const TrackedView& tracked);
 
 }  // namespace diastole::imaging

@@ -6,10 +6,10 @@
 
 namespace diastole::imaging {
 
-std::string tags_file_text(const std::vector<TagPoint>& points) {
+std::string tags_file_text(const std::vector<TrackedPoint>& points) {
   std::string text(tags_file_mark);
   text += ",own_mm,own_sigma_mm\n";
-  for (const TagPoint& point : points) {
+  for (const TrackedPoint& point : points) {
     fmt::format_to(std::back_inserter(text),
                    "{},{:.9f},{:.9f},{:.9f},{:.5f},{:.5f},{:.5f},{:.5f},{:.5f},{:.5f},{:.5f}\n", point.frame,
                    point.normal.x(), point.normal.y(), point.normal.z(), point.plane_mm, point.x_mm.x(),

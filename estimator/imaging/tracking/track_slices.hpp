@@ -13,7 +13,7 @@ namespace diastole::imaging {
 struct TrackedSlice {
   TagView view;
   TrackedView tracked;
-  TagPoints points;
+  TrackedPoints points;
 };
 
 /// The tagged slices of a folder with their pixels, frames numbered by the phases of all of them together. Throws InputError if there

@@ -108,7 +108,7 @@ std::vector<PhaseSummary> phase_summaries(const TrackedSlice& slice) {
   const double pixel_mm = slice.view.plane.finer_spacing_mm();
   for (size_t k = 0; k < slice.view.frames.size(); ++k) {
     PhaseSummary summary{slice.view.frames[k], slice.view.times_ms[k], 0, 0, slice.tracked.phases[k].noise};
-    for (const TagPoint& point : slice.points.points) {
+    for (const TrackedPoint& point : slice.points.points) {
       if (point.frame != summary.frame) continue;
       ++summary.points;
       summary.sigma_px += std::pow(point.sigma_mm / pixel_mm, 2);
@@ -147,7 +147,7 @@ TrackedFolder gathered(const TrackRequest& request, const ManualEdits& edits,
   find_slices_at_ends(tracked);
   double squares = 0;
   for (const TrackedSlice& slice : tracked.slices) {
-    for (const TagPoint& point : slice.points.points) {
+    for (const TrackedPoint& point : slice.points.points) {
       tracked.points.push_back(tracked.pose ? tracked.pose->to_specimen(point) : point);
       squares += std::pow(point.sigma_mm / slice.view.plane.finer_spacing_mm(), 2);
     }
@@ -158,7 +158,7 @@ TrackedFolder gathered(const TrackRequest& request, const ManualEdits& edits,
     throw InputError({request.folder.string(), "", "no tag could be followed in any slice",
                       tracked.problems.empty() ? "Look at the images." : tracked.problems.back().what});
   std::stable_sort(tracked.points.begin(), tracked.points.end(),
-                   [](const TagPoint& a, const TagPoint& b) { return a.frame < b.frame; });
+                   [](const TrackedPoint& a, const TrackedPoint& b) { return a.frame < b.frame; });
   tracked.rms_px = std::sqrt(squares / static_cast<double>(tracked.points.size()));
   return tracked;
 }

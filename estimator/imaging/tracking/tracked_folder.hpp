@@ -34,7 +34,7 @@ struct AppliedEdits {
 struct TrackedFolder {
   std::filesystem::path folder;
   std::vector<TrackedSlice> slices;
-  std::vector<TagPoint> points;  ///< in the specimen's coordinates if there is a pose, else the patient's
+  std::vector<TrackedPoint> points;  ///< in the specimen's coordinates if there is a pose, else the patient's
   std::map<std::string, size_t> dropped;
   std::optional<SpecimenPose> pose;
   std::optional<AnnulusOutline> outline;

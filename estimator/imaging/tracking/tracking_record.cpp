@@ -30,7 +30,7 @@ TrackedSliceImages slice_record(const TrackedSlice& slice, const std::vector<Dro
     image.sigma_px = summaries[k].sigma_px;
     image.residual = 100 * summaries[k].residual / static_cast<double>(white);
     image.picture = grey_picture(slice.view.images[k], white);
-    for (const TagPoint& point : slice.points.points) {
+    for (const TrackedPoint& point : slice.points.points) {
       if (point.frame != image.frame) continue;
       const Eigen::Vector2d pixel = plane.pixel(point.x_mm);
       for (const double number : {static_cast<double>(point.direction), static_cast<double>(point.tag),

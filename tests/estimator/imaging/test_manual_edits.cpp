@@ -39,7 +39,7 @@ class EditedRing {
   [[nodiscard]] std::string refusal(const std::string& edits) const {
     return test::message_of([&] { (void)track(edits); });
   }
-  [[nodiscard]] double radius_mm(const TagPoint& point) const { return point.x_mm.head<2>().norm(); }
+  [[nodiscard]] double radius_mm(const TrackedPoint& point) const { return point.x_mm.head<2>().norm(); }
 
   RingScan scan;
 
@@ -75,7 +75,7 @@ struct WrongPoints {
 
 WrongPoints wrong_points(const RingScan& scan, const TrackedFolder& tracked, int first, int last) {
   WrongPoints wrong;
-  for (const TagPoint& point : tracked.points) {
+  for (const TrackedPoint& point : tracked.points) {
     const double off_mm = scan.material_mm(point.frame, point.x_mm) - point.plane_mm;
     if (point.frame < first || point.frame > last || std::abs(off_mm) < 0.5 * scan.tag_spacing_mm) continue;
     ++wrong.count;
@@ -105,7 +105,7 @@ std::vector<Eigen::Vector2d> true_line_px(const RingScan& scan, int frame, doubl
 }
 
 double plane_of(const TrackedFolder& tracked, int tag) {
-  for (const TagPoint& point : tracked.points) {
+  for (const TrackedPoint& point : tracked.points) {
     if (point.tag == tag) return point.plane_mm;
   }
   return std::numeric_limits<double>::quiet_NaN();
@@ -138,7 +138,7 @@ TEST(ManualEdits, MaskedPixelsDoNotCountAndTheirPointsAreCounted) {
   const EditedRing ring(RingScan{});
   const Points corner = {{60, 60}, {95, 60}, {95, 95}, {60, 95}};
   const auto in_corner = [&](const TrackedFolder& tracked, int frame) {
-    return std::count_if(tracked.points.begin(), tracked.points.end(), [&](const TagPoint& point) {
+    return std::count_if(tracked.points.begin(), tracked.points.end(), [&](const TrackedPoint& point) {
       const Eigen::Vector3d from = point.x_mm - ring.scan.origin_mm;
       return point.frame == frame && from.x() > 60.5 && from.y() > 60.5;
     });
@@ -160,7 +160,7 @@ TEST(ManualEdits, ContoursSayWhatIsTissueInTheirPhase) {
   const EditedRing ring(RingScan{});
   const auto radii = [&](const TrackedFolder& tracked, int frame) {
     double least = 1e9, most = 0;
-    for (const TagPoint& point : tracked.points) {
+    for (const TrackedPoint& point : tracked.points) {
       if (point.frame != frame) continue;
       least = std::min(least, ring.radius_mm(point));
       most = std::max(most, ring.radius_mm(point));

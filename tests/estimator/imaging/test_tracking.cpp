@@ -22,7 +22,7 @@ struct Errors {
 
 Errors errors_of(const RingScan& scan, const TrackedFolder& tracked) {
   Errors errors;
-  for (const TagPoint& point : tracked.points) {
+  for (const TrackedPoint& point : tracked.points) {
     // A normal's sign is free.
     const double plane_mm = point.normal.dot(scan.normal()) < 0 ? -point.plane_mm : point.plane_mm;
     const double nearest = std::round(plane_mm / scan.tag_spacing_mm) * scan.tag_spacing_mm;
@@ -104,9 +104,9 @@ TEST(Tracking, NumbersFramesByPhaseAcrossAGap) {
   const TrackedFolder tracked = track_folder({.folder = scratch.path(), .coordinates = "patient"});
   EXPECT_LT(errors_of(scan, tracked).rms_px, 0.08);
   EXPECT_TRUE(std::none_of(tracked.points.begin(), tracked.points.end(),
-                           [](const TagPoint& p) { return p.frame == 5; }));
+                           [](const TrackedPoint& p) { return p.frame == 5; }));
   EXPECT_TRUE(std::any_of(tracked.points.begin(), tracked.points.end(),
-                          [](const TagPoint& p) { return p.frame == 8; }));
+                          [](const TrackedPoint& p) { return p.frame == 8; }));
 }
 
 TEST(Tracking, UsesAPoseAndSaysWhatIsMissingWithoutOne) {

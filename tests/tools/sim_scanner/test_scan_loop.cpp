@@ -54,7 +54,7 @@ LoopErrors errors_of(const imaging::TrackedFolder& tracked, const MovingBody& bo
   std::map<int, PointLocator> locators;
   // Where a slice's planes lie is the protocol's secret: the tracker's are right but for a hundredth of a millimetre or so, alike in
   // all phases, which is left out here by comparing with the planes as tracked.
-  for (const imaging::TagPoint& point : tracked.points) {
+  for (const imaging::TrackedPoint& point : tracked.points) {
     const auto phase = static_cast<size_t>(point.frame - 1);
     const auto locator =
         locators
