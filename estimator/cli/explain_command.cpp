@@ -171,7 +171,7 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
   explain::Explanation found;
   try {
     const bool imaged = study.data.tags || study.data.points;
-    if (imaged && !arguments.unexamined && !can_be_true(study)) return ExitCode::bad_input;
+    if (imaged && !arguments.unexamined && !can_be_true(study)) return ExitCode::negative;
     found = explain::explain_study(study, {.threads = arguments.threads,
                                            .propose = true,
                                            .learn = arguments.learn,
@@ -250,11 +250,8 @@ void add_explain(CommandLine& line, const ExplanationScorer& score) {
       "study names sessions in which nothing is wrong, [data] reference = [...] (diastole reference "
       "--help).\n"
       "`diastole effects` lists the effects that are known; `diastole effects FILE` checks one of yours. "
-      "Exit code 0: done, whatever the verdict; 1: "
-      "interrupted\n"
-      "before there was one,\n"
-      "or with --strict ambiguous or unexplained; 2: unreadable input, or images that cannot be what "
-      "they say.");
+      "Exit code 0: done, whatever the verdict; 1: images that cannot be what they say, interrupted before\n"
+      "there was a verdict, or with --strict ambiguous or unexplained; 2: unreadable input.");
   command
       ->add_option("STUDY", arguments->study, "study file with [data] runs; with --score the results' folder")
       ->required();

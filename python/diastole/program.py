@@ -14,7 +14,7 @@ Word = Union[str, "os.PathLike[str]", int, float]
 
 
 class DiastoleError(RuntimeError):
-    """A command refused: `code` 2 is wrong usage or input, 3 a fault of hardware or link; the text says what to do."""
+    """A command refused: `code` 1 is data that cannot be what they say or an interruption, 2 wrong usage or input, 3 a fault of hardware or link; the text says what to do."""
 
     def __init__(self, code: int, text: str) -> None:
         super().__init__(text)
@@ -33,7 +33,7 @@ def program() -> str:
 
 
 def call(command: str, *words: Word, cwd: Union[str, "os.PathLike[str]", None] = None) -> Any:
-    """The document of a command. Exit code 1, a negative answer, is an answer; 2 and 3 raise DiastoleError."""
+    """The document of a command. Exit code 1 with a document, a negative answer, is an answer; all else raises DiastoleError."""
     line: Sequence[str] = [program(), command, *(os.fspath(w) if not isinstance(w, (int, float)) else repr(w) for w in words), "--json"]
     ended = subprocess.run(line, cwd=cwd, capture_output=True, text=True, check=False)
     if ended.returncode not in (0, 1) or not ended.stdout.strip():

@@ -19,12 +19,13 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-/// What a job does stands in its input: `done`, `negative`, `failed`, or `slow`. Each start leaves a line in `starts`.
+/// What a job does stands in its input: `done`, `negative`, `refused`, `failed`, or `slow`. Each start leaves a line in `starts`.
 constexpr const char* player = R"script(#!/bin/bash
 echo "$1 $2 $(nproc)" >> "$(dirname "$0")/starts"
 case $(cat "$2") in
   done) echo '{"parameters": {"C1_kPa": {"value": 8.57, "se": 0.081}}, "verdict": "named", "effects": [{"id": "backlash"}]}' ;;
   negative) echo '{"verdict": "unexplained", "effects": []}'; exit 1 ;;
+  refused) echo "the data cannot be what they say" >&2; exit 1 ;;
   failed) echo "progress" >&2; echo "gel.csv: line 3: wrong" >&2; echo "  Mend it." >&2; exit 2 ;;
   slow) exec sleep 60 ;;
 esac
@@ -112,6 +113,17 @@ TEST_F(Batches, SaysHowEachJobEndedAndRunsOnlyWhatFailedAgain) {
                       fs::file_time_type::clock::now() + std::chrono::seconds(5));
   (void)run_batch(jobs, options());
   EXPECT_EQ(starts(), 7U);
+}
+
+TEST_F(Batches, ExitCode1WithoutADocumentIsNoAnswer) {
+  folder_.write("a.study.toml", "refused");
+  const Batch jobs = batch("[[job]]\ncommand = \"explain\"\ninputs = [\"a.study.toml\"]\n");
+  const JobEnd end = run_batch(jobs, options())[0];
+  EXPECT_EQ(end.state, JobState::failed);
+  EXPECT_EQ(end.exit_code, 1);
+  EXPECT_EQ(end.message, "the data cannot be what they say");
+  EXPECT_FALSE(fs::exists(jobs.output / "explain-a.json"));
+  EXPECT_EQ(remembered(jobs, jobs.jobs[0]).state, JobState::failed);
 }
 
 TEST_F(Batches, JobsAtOnceHaveOneProcessorEach) {

@@ -98,8 +98,12 @@ std::string last_lines(const fs::path& log) {
   return fmt::format("{}", fmt::join(lines.begin() + static_cast<std::ptrdiff_t>(first), lines.end(), "\n"));
 }
 
-JobState state_of(int exit_code) {
-  return exit_code == 0 ? JobState::done : exit_code == 1 ? JobState::negative : JobState::failed;
+/// `document`: what the command printed. A negative answer has one; without it the data were refused, or the command was interrupted.
+JobState state_of(int exit_code, const fs::path& document) {
+  if (exit_code == 0) return JobState::done;
+  std::error_code missing;
+  const bool has_document = fs::file_size(document, missing) > 0 && !missing;
+  return exit_code == 1 && has_document ? JobState::negative : JobState::failed;
 }
 
 /// The processors that this process may use.
@@ -178,7 +182,7 @@ JobEnd run_job(const Batch& batch, const Job& job, int processor, const RunOptio
     fs::remove(part);
     return {};
   }
-  JobEnd end{state_of(*code),
+  JobEnd end{state_of(*code, part),
              *code,
              std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count(),
              {},
@@ -229,8 +233,8 @@ JobEnd remembered(const Batch& batch, const Job& job) {
       record.value("input_ns", int64_t{0}) != mtime_ns(job.input))
     return {};
   const int code = record.value("exit_code", -1);
-  return {state_of(code), code, record.value("seconds", 0.0), record.value("result", ""),
-          record.value("message", "")};
+  return {state_of(code, file_of(batch, job, ".json")), code, record.value("seconds", 0.0),
+          record.value("result", ""), record.value("message", "")};
 }
 
 std::vector<JobEnd> run_batch(const Batch& batch, const RunOptions& options) {

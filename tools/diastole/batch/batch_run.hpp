@@ -19,7 +19,7 @@ namespace diastole::batch {
 enum class JobState {
   waiting,   ///< not run yet, or stopped
   done,      ///< exit code 0
-  negative,  ///< exit code 1: it ran, its answer is negative
+  negative,  ///< exit code 1 and a document: it ran, its answer is negative
   failed
 };
 const char* word_of(JobState state);
