@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "estimator/fe/elastic_model.hpp"
-#include "estimator/fit/joint_problem.hpp"
+#include "estimator/fit/motion_model.hpp"
 
 namespace diastole {
 

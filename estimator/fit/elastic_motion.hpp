@@ -12,7 +12,7 @@
 
 #include "estimator/fe/elastic_model.hpp"
 #include "estimator/fit/considered_errors.hpp"
-#include "estimator/fit/joint_problem.hpp"
+#include "estimator/fit/motion_model.hpp"
 
 namespace diastole {
 

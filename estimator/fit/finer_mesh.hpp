@@ -10,6 +10,7 @@
 
 #include "estimator/fit/elastic_motion.hpp"
 #include "estimator/io/study.hpp"
+#include "estimator/motion_residuals/motion_residuals.hpp"
 
 namespace diastole {
 

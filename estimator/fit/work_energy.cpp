@@ -11,6 +11,7 @@
 
 #include "estimator/io/number_table.hpp"
 #include "estimator/io/whole_file.hpp"
+#include "estimator/motion_residuals/motion_residuals.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
