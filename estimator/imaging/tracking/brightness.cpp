@@ -154,4 +154,13 @@ void Brightness::at(const Eigen::Vector2d& x_mm, std::span<double> amplitudes) c
   }
 }
 
+double Brightness::picture(const Eigen::Vector2d& x_mm, std::span<const double> patterns,
+                           std::span<double> amplitudes) const {
+  at(x_mm, amplitudes.first(patterns.size()));
+  double sum = 0;
+  for (size_t j = 0; j < patterns.size(); ++j)
+    sum += amplitudes[j] * patterns[j];
+  return sum;
+}
+
 }  // namespace diastole::imaging

@@ -10,6 +10,9 @@
 
 namespace diastole::imaging {
 
+/// Brightness varies over a tag spacing, not within it: there it is the tags' own.
+inline constexpr double window_in_spacings = 1.0;
+
 /// Amplitudes on the nodes of a coarse grid, by least squares in Gaussian windows; between nodes bilinear. Where a window holds
 /// little, the slice's own average takes over.
 class Brightness {
@@ -24,6 +27,9 @@ class Brightness {
   void solve(Places places);
   /// The amplitudes at a place that was solved for, written to `amplitudes`.
   void at(const Eigen::Vector2d& x_mm, std::span<double> amplitudes) const;
+  /// The picture there, sum_j amplitude_j pattern_j; its amplitudes are written to the first of `amplitudes`.
+  double picture(const Eigen::Vector2d& x_mm, std::span<const double> patterns,
+                 std::span<double> amplitudes) const;
 
  private:
   struct Corner {

@@ -249,10 +249,8 @@ CostMap cost_of(size_t k, const TagView& view, const Region& region, double wind
     for (Eigen::Index row = 0; row < image.rows(); ++row) {
       if (!region.wanted(row, column)) continue;
       look(row, column);
-      brightness.at(view.place_mm(row, column), std::span(amplitudes).first(count));
-      double picture = 0;
-      for (size_t i = 0; i < count; ++i)
-        picture += here[i] * amplitudes[i];
+      const double picture =
+          brightness.picture(view.place_mm(row, column), std::span(here).first(count), amplitudes);
       const double doubt = smooth_share * amplitudes[0];
       const double off = static_cast<double>(image(row, column)) - picture;
       cost(row, column) =

@@ -4,10 +4,10 @@
 // Image k is  sum_j amplitude_j(x) pattern_j(phi(x))  in tissue (tag_model.hpp), with  phi = 2 pi (k . x - offset + w / spacing)  and the
 // motion w of motion_field.hpp. Amplitudes are smooth fields (brightness.hpp), w a spline surface; both by least squares over
 // the pixels that are surely tissue:
-//   1. materials and the tags' planes at rest (materials.hpp);
-//   2. phase by phase from the motion of the phases before, with the tissue's edge found anew each time;
+//   1. materials (materials.hpp) and the tags' planes at rest (rest_waves.hpp);
+//   2. phase by phase from the motion of the phases before (image_fit.hpp), with the tissue's edge found anew each time;
 //   3. how alike neighbours and phases are is learnt from the result (motion_prior.hpp), and all phases are fitted at once.
-// The covariance of step 3 carries the noise as it is near the tags' own frequency (what zero-filling leaves of it) and what the fit
+// The covariance of step 3 carries the noise as it is near the tags' own frequency (tag_noise.hpp) and what the fit
 // leaves unexplained.
 
 #include <optional>

@@ -1,6 +1,7 @@
 #pragma once
 // One slice with its tag directions over the cycle: what is tracked at once.
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <vector>
@@ -44,6 +45,10 @@ struct TagView {
     return !edits.empty() && edits[phase].masked.size() > 0 && edits[phase].masked(row, column);
   }
   [[nodiscard]] Eigen::Vector2d extent_mm() const { return place_mm(plane.rows - 1, plane.columns - 1); }
+  /// A pixel counts as surely tissue this far inside: a pixel's half width and the point spread of a matrix that is half filled.
+  [[nodiscard]] double sure_mm() const {
+    return 1.25 * std::max(plane.row_spacing_mm, plane.column_spacing_mm);
+  }
 };
 
 }  // namespace diastole::imaging
