@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <fstream>
 #include <functional>
+#include <limits>
 #include <stdexcept>
 #include <vector>
 
@@ -21,10 +22,11 @@ constexpr std::array<AnnulusElements, 7> meshes{
 struct Growth {
   const char* what;
   std::function<double(const AnnulusAnswer&)> figure;
+  double most_exponent = std::numeric_limits<double>::infinity();
 };
 
 const std::array<Growth, 3> growths{
-    {{"time of the solution, s", [](const AnnulusAnswer& a) { return a.solve_processor_s; }},
+    {{"time of the solution, s", [](const AnnulusAnswer& a) { return a.solve_processor_s; }, 1.5},
      {"peak memory, MB", [](const AnnulusAnswer& a) { return a.process.peak_MB; }},
      {"factor, million entries",
       [](const AnnulusAnswer& a) { return 1e-6 * static_cast<double>(a.factor_entries); }}}};
@@ -71,7 +73,7 @@ LineChart chart_of(const std::vector<AnnulusAnswer>& answers) {
 }  // namespace
 
 void measure_growth(const AnnulusSolver& own, size_t most_elements, const std::filesystem::path& figure,
-                    const AnnulusWorkplace& place) {
+                    const AnnulusWorkplace& place, FigureTargets& targets) {
   std::filesystem::create_directories(place.folder);
   fmt::print(
       "| mesh | elements | unknowns | Newton steps | solution, processor s | ms an element | "
@@ -90,8 +92,14 @@ void measure_growth(const AnnulusSolver& own, size_t most_elements, const std::f
   }
   if (answers.size() < 2) return;
   fmt::print("\nFitted over the unknowns n:");
-  for (const Growth& growth : growths)
-    fmt::print(" {} ~ n^{:.2f};", growth.what, exponent(answers, growth));
+  for (const Growth& growth : growths) {
+    const double found = exponent(answers, growth);
+    const bool has_target = std::isfinite(growth.most_exponent);
+    fmt::print(" {} ~ n^{:.2f}{};", growth.what, found,
+               has_target ? fmt::format(" ({:g}){}", growth.most_exponent,
+                                        targets.mark(found <= growth.most_exponent))
+                          : "");
+  }
   fmt::print("\n");
   if (figure.empty()) return;
   std::ofstream file(figure);

@@ -19,6 +19,7 @@
 #include "protocol/contract/input_error.hpp"
 #include "tools/benchmarks/consoles_on_bench.hpp"
 #include "tools/benchmarks/daemon_on_bench.hpp"
+#include "tools/benchmarks/figure_targets.hpp"
 
 namespace {
 
@@ -110,8 +111,8 @@ struct Onlookers {
   int consoles = 0;
 };
 
-bool sustained(DaemonOnBench& bench, const BenchLoad& load, const Options& options,
-               const Onlookers& onlookers, double bare_cpu) {
+void sustained(DaemonOnBench& bench, const BenchLoad& load, const Options& options,
+               const Onlookers& onlookers, double bare_cpu, FigureTargets& targets) {
   auto client = bench.client();
   bench.start_run(client, options.seconds);
   std::this_thread::sleep_for(1s);
@@ -130,16 +131,16 @@ bool sustained(DaemonOnBench& bench, const BenchLoad& load, const Options& optio
   const json progress = DaemonOnBench::await_end(client);
   const ProcessFigures end = bench.figures();
   const auto missing = progress["missing"].get<int64_t>();
+  const bool is_whole = missing == 0 && progress["state"] == "done" && progress["result"]["regular"] == true;
   line(fmt::format("{} channels x {:g} kHz, {} followers, {} consoles", load.channels, 1e-3 * load.rate_Hz,
                    onlookers.followers, onlookers.consoles)
            .c_str(),
-       fmt::format("CPU {:.1f} % ({:.1f} x the bare loop), {} samples, {} lost; RSS {:.1f} MB in the run, "
+       fmt::format("CPU {:.1f} % ({:.1f} x the bare loop), {} samples, {} lost{}; RSS {:.1f} MB in the run, "
                    "{:.1f} MB at most while its file is written, {:.1f} MB after it",
-                   100 * cpu, cpu / bare_cpu, progress["received"].get<int64_t>(), missing, resident_MB,
-                   end.most_resident_MB, end.resident_MB));
+                   100 * cpu, cpu / bare_cpu, progress["received"].get<int64_t>(), missing,
+                   targets.mark(is_whole), resident_MB, end.most_resident_MB, end.resident_MB));
   for (const json& remark : progress["remarks"])
     if (remark["code"] != "instrument") fmt::print("    {}\n", remark["text"].get<std::string>());
-  return missing == 0 && progress["state"] == "done" && progress["result"]["regular"] == true;
 }
 
 /// From run.stop leaving the client to the request for a stop on the controller's line, in mid-run.
@@ -202,24 +203,26 @@ ExitCode bench(const Options& options) {
   const BenchLoad load;
   const double bare_cpu = bare_loop(load, 10);
   journal_cost(load, options);
-  bool whole = true;
+  FigureTargets targets;
   {
     DaemonOnBench daemon(load, options.directory);
     idle(daemon);
     for (const Onlookers onlookers : {Onlookers{}, {.followers = 10}, {.followers = 50}, {.consoles = 8}})
-      whole = sustained(daemon, load, options, onlookers, bare_cpu) && whole;
+      sustained(daemon, load, options, onlookers, bare_cpu, targets);
     stop_latency(daemon, options);
   }
   const BenchLoad usual{.channels = 2, .rate_Hz = 300};
   DaemonOnBench daemon(usual, options.directory);
-  whole = sustained(daemon, usual, options, {.followers = 1}, bare_loop(usual, 5)) && whole;
-  return whole ? ExitCode::done : ExitCode::negative;
+  sustained(daemon, usual, options, {.followers = 1}, bare_loop(usual, 5), targets);
+  return targets.conclude();
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("What the daemon costs in real time; exit code 1 if a sample was lost.", "bench_daemon");
+  CLI::App app(
+      "What the daemon costs in real time; exit code 1 if a sample was lost or a run was not regular.",
+      "bench_daemon");
   Options options;
   app.add_option("--seconds", options.seconds, "of each run")
       ->capture_default_str()

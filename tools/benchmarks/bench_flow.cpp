@@ -17,6 +17,7 @@
 #include "estimator/inference/intervals.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "tools/benchmarks/figure_targets.hpp"
 #include "tools/score/score.hpp"
 
 namespace diastole {
@@ -31,14 +32,12 @@ constexpr double least_coverage = 0.90, most_coverage = 0.98;
 
 struct Counts {
   size_t inside = 0, phases = 0;
-  bool any_missed = false;
-};
+  FigureTargets targets{};
 
-std::string judged(double value, double most, Counts& counts, const char* form = "{:+.2f}") {
-  const bool is_met = std::abs(value) <= most;
-  counts.any_missed = counts.any_missed || !is_met;
-  return fmt::format(fmt::runtime(form), value) + (is_met ? "" : " MISSED");
-}
+  std::string judged(double value, double most, const char* form = "{:+.2f}") {
+    return targets.within(value, -most, most, form);
+  }
+};
 
 void bench_scan(const fs::path& folder, const std::string& name, const json& label, Counts& counts) {
   const auto start = std::chrono::steady_clock::now();
@@ -49,8 +48,7 @@ void bench_scan(const fs::path& folder, const std::string& name, const json& lab
                                         .pressure = home / (name + ".pressure.csv"),
                                         .trigger = home / (name + ".trigger.csv")});
   } catch (const InputError& error) {
-    counts.any_missed = true;
-    fmt::print("{:<13} MISSED: {}\n", name, error.what());
+    fmt::print("{:<13}{}: {}\n", name, counts.targets.mark(false), error.what());
     return;
   }
   const imaging::FlowMeasurement& flow = session.flow;
@@ -72,11 +70,11 @@ void bench_scan(const fs::path& folder, const std::string& name, const json& lab
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   fmt::print(
       "{:<13}{:>10}{:>10}{:>10}{:>10}{:>12}{:>7} of {}{:>8.2f}{:>7.1f}\n", name,
-      judged(100 * (flow.stroke_mL.value / stroke - 1), stroke_percent, counts),
-      judged(100 * (flow.closure_mL.value - net) / stroke, net_percent, counts),
-      judged(100 * (peak / true_peak - 1), peak_percent, counts),
-      judged(100 * (work / true_work - 1), loop_percent, counts),
-      judged(flow.background.sigma_rad * flow.scan.cm_s_per_radian(), background_cm_s, counts, "{:.3f}"),
+      counts.judged(100 * (flow.stroke_mL.value / stroke - 1), stroke_percent),
+      counts.judged(100 * (flow.closure_mL.value - net) / stroke, net_percent),
+      counts.judged(100 * (peak / true_peak - 1), peak_percent),
+      counts.judged(100 * (work / true_work - 1), loop_percent),
+      counts.judged(flow.background.sigma_rad * flow.scan.cm_s_per_radian(), background_cm_s, "{:.3f}"),
       inside, truth.size(), std::sqrt(squares), seconds);
   std::fflush(stdout);
 }
@@ -99,18 +97,15 @@ int run(int argc, char** argv) {
       bench_scan(folder, name, label, counts);
   if (counts.phases == 0) {
     fmt::print("skipped: no scan of flow is labelled in {}\n", folder.string());
-    return counts.any_missed ? 1 : 0;
+    return static_cast<int>(counts.targets.conclude());
   }
   const double share = static_cast<double>(counts.inside) / static_cast<double>(counts.phases);
   const auto [low, high] = explain::clopper_pearson(counts.inside, counts.phases);
   // Phases of one scan err alike in part: the interval is of independent ones, and so a little too narrow.
   const bool is_met = share >= least_coverage && share <= most_coverage;
-  counts.any_missed = counts.any_missed || !is_met;
   fmt::print("{} of {} phases ({:.0f} %, {:.0f} to {:.0f} %) lie in their 95 % intervals{}\n", counts.inside,
-             counts.phases, 100 * share, 100 * low, 100 * high, is_met ? "" : " MISSED");
-  fmt::print("\n{}\n",
-             counts.any_missed ? "Some figures MISSED their targets." : "All figures meet their targets.");
-  return counts.any_missed ? 1 : 0;
+             counts.phases, 100 * share, 100 * low, 100 * high, counts.targets.mark(is_met));
+  return static_cast<int>(counts.targets.conclude());
 }
 
 }  // namespace

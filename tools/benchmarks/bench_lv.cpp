@@ -20,6 +20,7 @@
 #include "estimator/imaging/geometry/wall_map.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "tools/benchmarks/figure_targets.hpp"
 #include "tools/sim_scanner/ventricle_phantom.hpp"
 
 namespace diastole {
@@ -30,12 +31,7 @@ using Eigen::Vector3d;
 
 constexpr double surface_mm = 0.25, volume_percent = 2, shift_mm = 0.3, basal_shift_mm = 0.6, limit_s = 5;
 
-bool any_missed = false;
-
-std::string judged(double value, double most, const char* form = "{:.3f}") {
-  any_missed = any_missed || !(value <= most);
-  return fmt::format(fmt::runtime(form), value) + (value <= most ? "" : " MISSED");
-}
+FigureTargets targets;
 
 /// Rows of a table without its header, split at the commas.
 std::vector<std::vector<std::string>> rows_of(const fs::path& file) {
@@ -72,19 +68,19 @@ void score_case(const fs::path& folder, const std::string& name) {
   const imaging::VentricleSession session = imaging::measure_ventricle({}, guide);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   fmt::print("{}: points {:.3f} mm RMS from their walls, errors {:.2f} times those stated, {} s\n", name,
-             session.fit.rms_mm, session.fit.noise_factor, judged(seconds, limit_s, "{:.1f}"));
+             session.fit.rms_mm, session.fit.noise_factor, targets.at_most(seconds, limit_s, "{:.1f}"));
   fmt::print("  phase  endo (mm)  epi (mm)  cavity (mL)  error (%)  sigmas  least Jacobian\n");
   for (size_t p = 0; p < session.phases.size(); ++p) {
     const imaging::VentriclePhase& phase = session.phases[p];
     const imaging::WallMap map(session.fit.frame, session.fit.phases[p]);
     const double error = phase.mesh.cavity_mL - volumes.at(phase.phase);
     const double percent = 100 * error / volumes.at(phase.phase);
-    fmt::print("  {:5}  {:9}  {:8}  {:11.2f}  {:+9.2f}{}  {:6.1f}  {:.2f}\n", phase.phase,
-               judged(rms_mm(map, session.fit.frame, -0.5, walls.at({phase.phase, false})), surface_mm),
-               judged(rms_mm(map, session.fit.frame, 0.5, walls.at({phase.phase, true})), surface_mm),
-               phase.mesh.cavity_mL, percent, std::abs(percent) > volume_percent ? " MISSED" : "",
-               error / phase.cavity_sigma_mL, phase.mesh.least_jacobian);
-    any_missed = any_missed || std::abs(percent) > volume_percent;
+    fmt::print(
+        "  {:5}  {:9}  {:8}  {:11.2f}  {:+9.2f}{}  {:6.1f}  {:.2f}\n", phase.phase,
+        targets.at_most(rms_mm(map, session.fit.frame, -0.5, walls.at({phase.phase, false})), surface_mm),
+        targets.at_most(rms_mm(map, session.fit.frame, 0.5, walls.at({phase.phase, true})), surface_mm),
+        phase.mesh.cavity_mL, percent, targets.mark(std::abs(percent) <= volume_percent),
+        error / phase.cavity_sigma_mL, phase.mesh.least_jacobian);
   }
   const nlohmann::json labels = nlohmann::json::parse(read_whole_file(folder / "labels.json"));
   const nlohmann::json& shifts = labels.at("cases").at(name).at("slice_shift_patient_mm");
@@ -96,7 +92,7 @@ void score_case(const fs::path& folder, const std::string& name) {
     const std::vector<double> truth = shifts.value(shift.slice, std::vector<double>{0, 0, 0});
     const double error = (shift.shift_mm - Vector3d(truth[0], truth[1], truth[2])).norm();
     fmt::print("  slice {}: displaced by {:.2f} mm, error {} mm\n", shift.slice, shift.shift_mm.norm(),
-               judged(error, shift.slice == last ? basal_shift_mm : shift_mm, "{:.2f}"));
+               targets.at_most(error, shift.slice == last ? basal_shift_mm : shift_mm, "{:.2f}"));
   }
 }
 
@@ -130,8 +126,8 @@ void score_random(int count) {
   fmt::print(
       "{} random ventricles of 3 phases: {} refused, least Jacobian {:.2f}, walls {} mm RMS (worst phase "
       "{:.2f}), volume within {:.1f} %\n",
-      count, judged(folded, 0, "{:.0f}"), least_jacobian, judged(std::sqrt(squares), surface_mm), worst_mm,
-      worst_percent);
+      count, targets.at_most(folded, 0, "{:.0f}"), least_jacobian,
+      targets.at_most(std::sqrt(squares), surface_mm), worst_mm, worst_percent);
 }
 
 }  // namespace
@@ -164,5 +160,5 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "{}\n", error.what());
     return 2;
   }
-  return any_missed ? 1 : 0;
+  return static_cast<int>(targets.conclude());
 }
