@@ -19,6 +19,7 @@ class Place:
 
     def __init__(self, folder, programs, source):
         self.folder, self.programs = pathlib.Path(folder), pathlib.Path(programs)
+        self.firmware = pathlib.Path(source) / "build/firmware"
         os.symlink(pathlib.Path(source) / "examples", self.folder / "examples")
         (self.folder / "tests").mkdir()
         os.symlink(pathlib.Path(source) / "tests/data", self.folder / "tests/data")
@@ -41,6 +42,11 @@ class Place:
             assert line, f"{arguments[0]} ended: {said}"
             said += line
         return program, said
+
+
+def end(program):
+    program.send_signal(signal.SIGTERM)
+    program.communicate()
 
 
 def make_pop_test(source, target):
@@ -85,6 +91,14 @@ def make_diffusion(folder, axes):
     image = towards @ turn * [-1, 1, 1]  # FSL's convention for right-handed axes
     (folder / "dwi.bval").write_text("0" + " 1000" * 12)
     (folder / "dwi.bvec").write_text("\n".join("0 " + " ".join(map(str, row)) for row in image.T))
+
+
+def make_pressure(folder):
+    """Ten cycles of 1.2 s with their triggers, as tables for `diastole flow`."""
+    time_s = np.arange(1300) / 100
+    np.savetxt(folder / "pressure.csv", np.column_stack([time_s, 0.25 - 0.25 * np.cos(2 * np.pi * time_s / 1.2)]),
+               "%.4f", ",", header="time_s,cavity_kPa", comments="")
+    np.savetxt(folder / "trigger.csv", 1.2 * np.arange(10), "%.4f", header="time_s", comments="")
 
 
 def of_files(place):
@@ -143,7 +157,15 @@ def of_files(place):
     yield "images", place.run("images examples/tagged-gel/dicom")
     yield "track", place.run("track examples/tagged-gel/dicom -o gel.tags.csv")
     yield "scan", place.run(f"scan {gel} --mesh 4,2,1 --set C1_kPa=8.71 -o trial --matrix 48 --phases 3 --peak-kPa 3 --tag-spacing 12")
-    yield "scan", place.run("scan examples/lv-clean.study.toml --mesh 4,2,1 -o flow --no-tags --flow --diffusion --peak-kPa 0.5 --phases 5")
+    heart = "examples/lv-clean.study.toml --mesh 4,2,1 --no-tags --peak-kPa 0.5 --matrix 64 --tag-spacing 12"
+    yield "scan", place.run(f"scan {heart} -o flow --flow --diffusion --phases 5")
+    make_pressure(place.folder)
+    yield "flow", place.run("flow flow/dicom -o heart.flow.csv --pressure pressure.csv --trigger trigger.csv --loop heart.loop.csv")
+    place.run(f"scan {heart} -o cine --cine --dark-bath --phases 2 --short-axis=-20,0,10 --long-axis 0,90")
+    for images in ("examples/tagged-gel/dicom --edits gel.edits.jsonl", "cine/dicom"):
+        desk, said = place.start("diastole", "desk", *images.split(), "--no-browser", "--json", until="}")
+        end(desk)
+        yield "desk", json.loads(said)
     yield "runs", place.run("runs . kind=run")
     yield "runs", place.run("runs . kind=fit -o runs.html")
     yield "doctor", place.run("doctor --latency-s 0.2", (0, 1))
@@ -186,15 +208,31 @@ def of_daemon(place):
         yield "console", place.run(f"console {at}")
     finally:
         for program in (daemon, rig):
-            program.send_signal(signal.SIGTERM)
-            program.communicate()
+            end(program)
     yield "recover", place.run("recover --list journals")
     journal = next((place.folder / "journals").glob("*.journal"))
     yield "recover", place.run(f"recover {journal} -o recovered.run.h5", (0, 1))
 
 
+def of_board(place):
+    """Firmware goes to the emulated board; the image is of the preset `firmware`."""
+    yield "flash", place.run("flash --new-key key.pem")
+    image = place.firmware / "bin/diastole-stm32f405.image"
+    if not image.exists():
+        print(f"flash of an image: skipped, there is no {image}: build the preset `firmware` first")
+        return
+    shutil.copy(image, place.folder / "own.image")
+    yield "flash", place.run("flash own.image --sign key.pem --counter 3")
+    board, _ = place.start("sim_board", str(image.with_suffix(".bin")), "--link", "board", "--real-time", until="port")
+    try:
+        yield "flash", place.run(f"flash {image} --port board --dry-run")
+        yield "flash", place.run(f"flash {place.firmware / 'tests/newer.image'} --port board")
+    finally:
+        end(board)
+
+
 def documents(place, slow=False):
-    for group in (of_files, of_daemon, *((of_sessions,) if slow else ())):
+    for group in (of_files, of_daemon, of_board, *((of_sessions,) if slow else ())):
         for command, document in group(place):
             if document is not None:
                 yield command, document

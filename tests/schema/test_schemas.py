@@ -15,9 +15,7 @@ import jsonschema
 
 import documents
 
-# These need a board, a scanner's phase contrast or somebody who sits at a browser: their own tests hold them (flash, flow, desk), or
-# they print no document (daemon).
-ELSEWHERE = {"daemon", "flash", "flow", "desk"}
+NO_DOCUMENT = {"daemon"}
 
 
 def errors_of(validator, document):
@@ -38,7 +36,7 @@ def main(source, programs, slow):
 
     said = subprocess.run([programs / "diastole", "--help"], capture_output=True, text=True, check=True).stdout
     commands = set(re.findall(r"^  ([a-z-]+) {2,}", said[said.index("Subcommands:"):], re.MULTILINE))
-    problems += [f"{name} has no schema in docs/schema" for name in sorted(commands - set(validators) - {"daemon"})]
+    problems += [f"{name} has no schema in docs/schema" for name in sorted(commands - set(validators) - NO_DOCUMENT)]
     problems += [f"docs/schema has a schema of {name}, which is no command" for name in sorted(set(validators) - commands)]
 
     with tempfile.TemporaryDirectory() as work:
@@ -47,7 +45,7 @@ def main(source, programs, slow):
             found = list(errors_of(validators[command], document))
             print(f"{command}: {'as its schema says' if not found else found[0]}", flush=True)
             problems += [f"{command}: {problem}" for problem in found]
-    unheld = commands - seen - ELSEWHERE - (set() if slow else documents.SLOW)
+    unheld = commands - seen - NO_DOCUMENT - (set() if slow else documents.SLOW)
     problems += [f"{name} was not asked for its document" for name in sorted(unheld)]
 
     sys.path.insert(0, str(source / "python"))
