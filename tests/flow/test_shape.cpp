@@ -36,6 +36,7 @@ TEST(ShapeFlow, LearnsOnTheSimulatedRigAndKeepsTheBest) {
   EXPECT_EQ(found["iterations"][1].at("source"), "gated volume");
   EXPECT_EQ(found.at("best"), 1);
   EXPECT_EQ(found.at("drive"), "followed.2.csv");
+  EXPECT_EQ(found.at("followed"), true);
   EXPECT_TRUE(std::filesystem::exists(place / "followed.html"));
   // The same by files.
   const Ended after = run(place, shaped({"diastole", "shape", wanted, "-o", "next.csv", "--after",
@@ -74,6 +75,26 @@ TEST(ShapeFlow, StopsWhenTheSpecimenBeginsToLeakInARun) {
       run(place, shaped({"diastole", "shape", wanted, "-o", "next.csv", "--after", "leak.1.run.h5"}));
   EXPECT_EQ(after.exit_code, 1);
   EXPECT_FALSE(std::filesystem::exists(place / "next.csv"));
+}
+
+/// Three times as fast as the example, of which the pump's limits leave another curve.
+TEST(ShapeFlow, SaysWhenTheNearestDriveIsFarFromTheCurve) {
+  const Workplace place;
+  place.write("fast.csv", "time_s,volume_mL\n0,0\n0.05,1\n0.2,18\n0.3,24\n0.35,12\n0.4,0\n");
+  const Ended far = run(place, shaped({"diastole", "shape", "fast.csv", "-o", "drive.csv"}));
+  EXPECT_EQ(far.exit_code, 1) << far.err;
+  const json found = far.json();
+  EXPECT_GT(found.at("drive_nrmse"), 0.05);
+  EXPECT_EQ(found.at("tolerance"), 0.05);
+  EXPECT_EQ(found.at("followed"), false);
+  EXPECT_TRUE(std::filesystem::exists(place / "drive.csv")) << "it is the nearest";
+  EXPECT_THAT(far.err, HasSubstr("With this drive the specimen misses the curve by "));
+  EXPECT_THAT(far.err, HasSubstr("5 % are allowed (--tolerance-percent)"));
+
+  const Ended allowed =
+      run(place, shaped({"diastole", "shape", "fast.csv", "-o", "drive.csv", "--tolerance-percent", "50"}));
+  EXPECT_EQ(allowed.exit_code, 0) << allowed.err;
+  EXPECT_EQ(allowed.json().at("followed"), true);
 }
 
 TEST(ShapeFlow, RunsThroughTheDaemon) {

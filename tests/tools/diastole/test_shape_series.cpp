@@ -26,14 +26,15 @@ class ShapeSeriesTest : public testing::Test {
   [[nodiscard]] fs::path output() const { return folder_.path() / "followed.run.h5"; }
   [[nodiscard]] fs::path at(const std::string& name) const { return folder_.path() / name; }
 
-  ExitCode carry_out(size_t iterations, bool force, const SessionSeries::Acquire& acquire) {
+  ExitCode carry_out(size_t iterations, bool force, const SessionSeries::Acquire& acquire,
+                     double tolerance_percent = 5) {
     const fs::path example = fs::path(DIASTOLE_SOURCE_DIR) / "examples/shape";
     CLI::App command;
     const std::shared_ptr<SessionSeries> series = make_shape_series();
     series->add_options(command);
-    command.parse(fmt::format("--shape {} --study {} --cycles 9 --iterations {}",
+    command.parse(fmt::format("--shape {} --study {} --cycles 9 --iterations {} --tolerance-percent {}",
                               (example / "ventricle.csv").string(), (example / "gel.study.toml").string(),
-                              iterations));
+                              iterations, tolerance_percent));
     testing::internal::CaptureStdout();
     testing::internal::CaptureStderr();
     std::optional<InputError> refused;
@@ -88,6 +89,17 @@ TEST_F(ShapeSeriesTest, TheSecondSessionPlaysWhatTheFirstHasTaught) {
   EXPECT_NE(read_experiment(experiments[0]).segments[0].stroke_mL,
             read_experiment(experiments[1]).segments[0].stroke_mL);
   EXPECT_THAT(printed_, testing::HasSubstr("followed.2.run.h5: NRMSE"));
+}
+
+TEST_F(ShapeSeriesTest, ABestRunThatMissesTheCurveIsANegativeAnswer) {
+  const SessionSeries::Acquire acquire = [&](const std::string& experiment, const std::string& run) {
+    return played(experiment, run);
+  };
+  EXPECT_EQ(carry_out(1, false, acquire, 50), ExitCode::done) << remarks_;
+  EXPECT_EQ(carry_out(1, true, acquire), ExitCode::negative)
+      << "five hidden effects, and nothing learned yet";
+  EXPECT_THAT(remarks_, testing::HasSubstr("With the best drive that was run the specimen misses the curve"));
+  EXPECT_THAT(remarks_, testing::HasSubstr("5 % are allowed"));
 }
 
 TEST_F(ShapeSeriesTest, AFaultySessionStopsTheSeriesAndKeepsItsExitCode) {

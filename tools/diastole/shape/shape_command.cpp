@@ -52,8 +52,11 @@ ExitCode shape(const ShapeOptions& options, const CommandOutput& out) {
   }
   if (!options.page.empty())
     write_whole_file(options.page, shaping_page(shaping, shaper.wanted_mL(), shaper.target()));
+  const bool is_followed = !changed && shaper.is_within_tolerance(shaping.drive_nrmse);
   if (out.json) {
     shaping::Json document = shaping_json(shaping);
+    document["tolerance"] = shaper.tolerance();
+    document["followed"] = is_followed;
     document["drive"] = changed ? shaping::Json() : shaping::Json(options.drive.string());
     document["experiment"] = changed ? shaping::Json() : shaping::Json(experiment.string());
     document["page"] = options.page.empty() ? shaping::Json() : shaping::Json(options.page.string());
@@ -63,7 +66,9 @@ ExitCode shape(const ShapeOptions& options, const CommandOutput& out) {
     if (changed) fmt::print("No drive was written: find what has changed first.\n");
     if (!changed) fmt::print("{} and {}\n", options.drive.string(), experiment.string());
   }
-  return changed ? ExitCode::negative : ExitCode::done;
+  if (!changed && !is_followed)
+    fmt::print(stderr, "{}", shaper.miss_in_words("this drive", shaping.drive_nrmse));
+  return is_followed ? ExitCode::done : ExitCode::negative;
 }
 
 }  // namespace
@@ -82,8 +87,9 @@ void add_shape(CommandLine& line) {
       "  diastole shape ventricle.csv --study explained.study.toml -o drive3.csv --after first.run.h5 "
       "second.run.h5\n"
       "      all runs so far, in their order: the best is kept\n"
-      "`diastole run --shape` does it live. Exit code 1: the specimen or the rig has changed, no drive is "
-      "written.");
+      "`diastole run --shape` does it live. Exit code 1: with this drive, the nearest that the pump can do,\n"
+      "the specimen misses the curve by more than --tolerance-percent; or the specimen or the rig has\n"
+      "changed, and no drive is written.");
   command
       ->add_option("TARGET", options->request.wanted.file,
                    "wanted curve: time_s or phase, volume_mL, pressure_kPa or fraction")

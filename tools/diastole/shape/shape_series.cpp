@@ -33,6 +33,11 @@ void add_request_to(CLI::App& command, ShapeRequest& request) {
       .add_option("--least", request.wanted.least,
                   "what the curve's lowest point stands for: mL since rest, or kPa")
       ->capture_default_str();
+  command
+      .add_option("--tolerance-percent", request.tolerance_percent,
+                  "NRMSE up to which the specimen follows the curve; exit code 1 beyond it")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
   command.add_option("--cycles", request.plan.cycles, "of a run, the first three of which set in")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000));
@@ -142,11 +147,17 @@ ExitCode ShapeSeries::carry_out(const std::string& output, bool force, const Acq
     if (!out.json) fmt::print("{}\n", shaping_words(shaping));
   }
   if (shaping.lesson.ending == Ending::changed) code = std::max(code, ExitCode::negative);
+  const bool is_within = shaping.lesson.best && shaper.is_within_tolerance(shaping.nrmse);
+  const bool is_missed = shaping.lesson.best && !is_within && end.empty();
+  if (is_missed) code = std::max(code, ExitCode::negative);
   if (!page_.empty()) write_whole_file(page_, shaping_page(shaping, shaper.wanted_mL(), shaper.target()));
   if (!end.empty())
     fmt::print(stderr, "The last session did not end as planned ({}): learning stops.\n", end);
+  if (is_missed) fmt::print(stderr, "{}", shaper.miss_in_words("the best drive that was run", shaping.nrmse));
   if (out.json) {
     Json document = shaping_json(shaping);
+    document["tolerance"] = shaper.tolerance();
+    document["followed"] = is_within && shaping.lesson.ending != Ending::changed;
     document["runs"] = Json::array();
     for (const fs::path& run : runs_)
       document["runs"].push_back(run.string());

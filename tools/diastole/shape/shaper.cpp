@@ -90,10 +90,20 @@ Shaping Shaper::after(const std::vector<std::filesystem::path>& runs) const {
   PeriodicCurve expected = shaping.lesson.expected_mL;
   expected.c[0] = wanted_mL_.c[0];
   const std::vector<Iteration>& runs_so_far = shaping.lesson.iterations;
-  shaping.nrmse = std::hypot(rms_between(expected, wanted_mL_), pump_.rounding_mL()) / wanted_mL_.range();
+  shaping.drive_nrmse =
+      std::hypot(rms_between(expected, wanted_mL_), pump_.rounding_mL()) / wanted_mL_.range();
+  shaping.nrmse = shaping.drive_nrmse;
   if (!runs_so_far.empty())
     shaping.nrmse = runs_so_far[shaping.lesson.best.value_or(runs_so_far.size() - 1)].nrmse;
+  if (shaping.lesson.ending != Ending::none) shaping.drive_nrmse = shaping.nrmse;
   return shaping;
+}
+
+std::string Shaper::miss_in_words(std::string_view who, double nrmse) const {
+  return fmt::format(
+      "With {} the specimen misses the curve by {:.2f} % of its range, and {:g} % are allowed "
+      "(--tolerance-percent).\n  Want a smaller range or a longer period, or allow more.\n",
+      who, 100.0 * nrmse, request_.tolerance_percent);
 }
 
 void Shaper::plan_cycle(Shaping& shaping) const {
@@ -118,7 +128,9 @@ void Shaper::plan_cycle(Shaping& shaping) const {
 Json shaping_json(const Shaping& shaping) {
   const Lesson& lesson = shaping.lesson;
   const auto or_null = [](const std::string& text) { return text.empty() ? Json() : Json(text); };
-  Json document{{"nrmse", shaping.nrmse}, {"binding_limit", or_null(shaping.binding_limit)}};
+  Json document{{"nrmse", shaping.nrmse},
+                {"drive_nrmse", shaping.drive_nrmse},
+                {"binding_limit", or_null(shaping.binding_limit)}};
   document["iterations"] = Json::array();
   for (const Iteration& it : lesson.iterations)
     document["iterations"].push_back({{"run", it.run},

@@ -3,6 +3,9 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "estimator/shaping/learning.hpp"
 #include "tools/diastole/shape/pump.hpp"
@@ -17,6 +20,7 @@ struct ShapeRequest {
   std::filesystem::path study;
   std::filesystem::path rig;  ///< empty: as the study's first run describes it
   CyclePlan plan;
+  double tolerance_percent = 5.0;  ///< NRMSE up to which the specimen follows the curve
 };
 
 struct Shaping {
@@ -24,6 +28,8 @@ struct Shaping {
   PlannedCycle cycle;         ///< of lesson.drive_mL
   std::string binding_limit;  ///< that holds the drive back; empty: none
   double nrmse = 0.0;  ///< of the best run, or the last if none counts; before any, as the model expects
+  /// Of lesson.drive_mL: as the model expects, or as the best run showed where learning has ended.
+  double drive_nrmse = 0.0;
 };
 
 class Shaper {
@@ -35,6 +41,12 @@ class Shaper {
   [[nodiscard]] Shaping after(const std::vector<std::filesystem::path>& runs) const;
   [[nodiscard]] const PeriodicCurve& wanted_mL() const { return wanted_mL_; }
   [[nodiscard]] const CyclePlan& plan() const { return request_.plan; }
+  [[nodiscard]] bool is_within_tolerance(double nrmse) const {
+    return 100.0 * nrmse <= request_.tolerance_percent;
+  }
+  [[nodiscard]] double tolerance() const { return request_.tolerance_percent / 100.0; }
+  /// Why the answer is negative, with what may be done. `who`: "this drive".
+  [[nodiscard]] std::string miss_in_words(std::string_view who, double nrmse) const;
   [[nodiscard]] std::string target() const { return request_.wanted.file.filename().string(); }
 
  private:
