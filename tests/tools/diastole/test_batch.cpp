@@ -19,7 +19,8 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-/// What a job does stands in its input: `done`, `negative`, `refused`, `failed`, or `slow`. Each start leaves a line in `starts`.
+/// What a job does stands in its input: `done`, `negative`, `refused`, `failed`, `slow`, or `where` it runs. Each start leaves a line in
+/// `starts`.
 constexpr const char* player = R"script(#!/bin/bash
 echo "$1 $2 $(nproc)" >> "$(dirname "$0")/starts"
 case $(cat "$2") in
@@ -28,6 +29,7 @@ case $(cat "$2") in
   refused) echo "the data cannot be what they say" >&2; exit 1 ;;
   failed) echo "progress" >&2; echo "gel.csv: line 3: wrong" >&2; echo "  Mend it." >&2; exit 2 ;;
   slow) exec sleep 60 ;;
+  where) pwd -P ;;
 esac
 )script";
 
@@ -81,6 +83,32 @@ TEST_F(Batches, RefusesWithPlaceAndRemedy) {
       refused("[[job]]\ncommand = \"fit\"\ninputs = [\"a.study.toml\"]\narguments = [\"-o\", \"x\"]\n"),
       HasSubstr("\"-o\" is set by the batch"));
   EXPECT_THAT(refused("[[job]]\ncommand = \"fit\"\ninput = [\"a.study.toml\"]\n"), HasSubstr("inputs"));
+}
+
+TEST_F(Batches, RefusesArgumentsThatWouldGoElsewhereOrDoSomethingElse) {
+  folder_.write("a.study.toml", "done");
+  folder_.write("b.study.toml", "done");
+  const auto with = [](const char* argument, const char* inputs = "a.study.toml") {
+    return fmt::format("[[job]]\ncommand = \"fit\"\ninputs = [\"{}\"]\narguments = [\"{}\"]\n", inputs,
+                       argument);
+  };
+  for (const char* set : {"-o", "-ox.fit.json", "--output=x", "--json"})
+    EXPECT_THAT(refused(with(set)), HasSubstr(fmt::format("\"{}\" is set by the batch", set)));
+  for (const char* help : {"-h", "-hx", "--help"})
+    EXPECT_THAT(refused(with(help)), HasSubstr("only prints help"));
+  for (const char* file : {"--checkpoint", "--page=x.html"})
+    EXPECT_THAT(refused(with(file, "*.study.toml")), HasSubstr("would be one file of 2 jobs"));
+  EXPECT_EQ(batch(with("--checkpoint")).jobs.size(), 1U) << "of one job it is that job's";
+  EXPECT_EQ(batch(with("-20")).jobs.size(), 1U);
+}
+
+/// Whatever folder the batch is started in, also by Slurm.
+TEST_F(Batches, FilesInArgumentsCountFromTheBatchFile) {
+  folder_.write("a.study.toml", "where");
+  const Batch jobs = batch("[[job]]\ncommand = \"fit\"\ninputs = [\"a.study.toml\"]\n");
+  (void)run_batch(jobs, options());
+  EXPECT_THAT(read_whole_file(jobs.output / "fit-a.json"),
+              HasSubstr(fs::canonical(folder_.path()).string() + "\n"));
 }
 
 TEST_F(Batches, SaysHowEachJobEndedAndRunsOnlyWhatFailedAgain) {

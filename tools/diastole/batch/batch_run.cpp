@@ -119,8 +119,10 @@ std::vector<int> processors() {
 
 /// In the child, between fork and exec: only what is safe there. Ctrl-C is the batch's, which ends its jobs and ends them too if it
 /// is killed. Commands share their loops between the processors that they may use; several jobs share those instead.
-[[noreturn]] void become(const std::vector<char*>& arguments, int output, int log, int processor) {
+[[noreturn]] void become(const std::vector<char*>& arguments, const char* folder, int output, int log,
+                         int processor) {
   ::setpgid(0, 0);
+  if (::chdir(folder) != 0) ::_exit(127);
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);
   if (processor >= 0) {
     cpu_set_t one;
@@ -135,9 +137,10 @@ std::vector<int> processors() {
   ::_exit(127);
 }
 
-/// The exit code, -1 if a signal ended it; none if it was asked to end.
-std::optional<int> run_process(const std::vector<std::string>& line, const fs::path& output,
-                               const fs::path& log, int processor, const RunOptions& options) {
+/// In the folder. The exit code, -1 if a signal ended it; none if it was asked to end.
+std::optional<int> run_process(const std::vector<std::string>& line, const fs::path& folder,
+                               const fs::path& output, const fs::path& log, int processor,
+                               const RunOptions& options) {
   constexpr auto pause = std::chrono::milliseconds(20);
   std::vector<char*> arguments;
   for (const std::string& argument : line)
@@ -147,7 +150,7 @@ std::optional<int> run_process(const std::vector<std::string>& line, const fs::p
   const std::array<int, 2> files{::open(output.c_str(), mode, 0644), ::open(log.c_str(), mode, 0644)};
   const bool open = files[0] >= 0 && files[1] >= 0;
   const pid_t child = open ? ::fork() : -1;
-  if (child == 0) become(arguments, files[0], files[1], processor);
+  if (child == 0) become(arguments, folder.c_str(), files[0], files[1], processor);
   const int error = errno;
   for (const int file : files)
     if (file >= 0) ::close(file);
@@ -177,7 +180,7 @@ JobEnd run_job(const Batch& batch, const Job& job, int processor, const RunOptio
   const int64_t input_ns = mtime_ns(job.input);
   std::vector<std::string> line{options.program};
   line.insert(line.end(), job.arguments.begin(), job.arguments.end());
-  const std::optional<int> code = run_process(line, part, log, processor, options);
+  const std::optional<int> code = run_process(line, batch.file.parent_path(), part, log, processor, options);
   if (!code) {
     fs::remove(part);
     return {};
