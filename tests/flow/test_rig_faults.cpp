@@ -92,6 +92,15 @@ TEST(RigFaults, AControllerUnpluggedWhileTheDaemonStartsIsToldWithExitCode3) {
   EXPECT_THAT(daemon.err, testing::AllOf(testing::HasSubstr(line), testing::HasSubstr("does not answer")));
 }
 
+TEST(RigFaults, ARunThatLeavesNoFileIsToldWithItsFirstError) {
+  FaultyRig rig("serial-hangup@run+0", FaultyRig::Time::conducted);
+  const Ended ended = rig.acquire("1");
+  EXPECT_EQ(ended.exit_code, 3) << ended.err;
+  EXPECT_THAT(ended.err, testing::HasSubstr("There is nothing to recover"));
+  EXPECT_THAT(ended.err, testing::HasSubstr(
+                             "(the run's first error: the serial line is gone; the pump stops by itself)"));
+}
+
 TEST(RigFaults, ADroppedInstrumentBecomesGapsOfExactlyItsLength) {
   FaultyRig rig("daq-drop@5+0.2", FaultyRig::Time::conducted);
   const Ended ended = rig.acquire("10");

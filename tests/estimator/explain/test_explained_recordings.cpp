@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/changed_run.hpp"
+#include "tests/estimator/io/scratch_file.hpp"
 #include "tests/recorded_data.hpp"
 
 namespace diastole {
@@ -66,6 +68,18 @@ TEST(ExplainedRecordings, TeachNoLawWhereNothingIsMissing) {
   EXPECT_EQ(found.at("verdict"), "none");
   EXPECT_TRUE(found.at("learned").is_null());
   EXPECT_EQ(found.at("not_learned"), "nothing exceeds the model's own error");
+}
+
+TEST(ExplainedRecordings, SayWhereThePistonsMotionWasSmoothed) {
+  const test::ScratchFolder folder;
+  const std::filesystem::path session = folder.path() / "case-030";
+  std::filesystem::copy(test::recorded("rig/case-030"), session, std::filesystem::copy_options::recursive);
+  test::wobble_steps(session / "baseline.run.h5");
+  const nlohmann::json found = explained({session.string(), "SmoothedMotion", {}, {}});
+  ASSERT_TRUE(found.is_object());
+  EXPECT_THAT(found.at("summary").get<std::string>(),
+              testing::HasSubstr("No motion that is known follows the counted steps of baseline: they were "
+                                 "smoothed, and are up to 0.1"));
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -5,6 +5,7 @@
 
 #include "estimator/model/session.hpp"
 #include "protocol/runfile/amended_file.hpp"
+#include "tests/changed_run.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 #include "tests/recorded_data.hpp"
 
@@ -31,6 +32,17 @@ TEST(Session, IsRefusedWhereTheRigCannotBe) {
     return written;
   });
   EXPECT_THAT(refusal(), HasSubstr("attribute /rig hose_length_m"));
+}
+
+TEST(Session, KnowsHowFarASmoothedMotionIsFromTheSteps) {
+  const test::ScratchFolder folder;
+  fs::copy(test::recorded("rig/case-030"), folder.path(), fs::copy_options::recursive);
+  const Study study = read_study(folder.path() / "case-030.study.toml");
+  EXPECT_EQ(read_session(study).runs.at(0).smoothed_mL, 0.0);
+  test::wobble_steps(study.data.runs.front());
+  const double smoothed_mL = read_session(study).runs.at(0).smoothed_mL;
+  EXPECT_GT(smoothed_mL, 0.05);
+  EXPECT_LT(smoothed_mL, 0.3);
 }
 
 }  // namespace
