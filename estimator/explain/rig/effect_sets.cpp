@@ -4,14 +4,15 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <optional>
 #include <span>
 #include <tuple>
 
 #include "estimator/explain/rig/changed_parts.hpp"
 #include "estimator/explain/rig/event_scan.hpp"
+#include "estimator/explain/rig/fitted_part.hpp"
 #include "estimator/explain/rig/part_strain.hpp"
+#include "estimator/explain/rig/screening.hpp"
 #include "estimator/explain/rig/set_fit.hpp"
 #include "estimator/explain/rig/synergy_scan.hpp"
 #include "estimator/rig_fit/base_fit.hpp"
@@ -27,122 +28,9 @@ using rig::SessionModel;
 constexpr size_t singles_fitted = 6;
 constexpr size_t pairs_fitted = 4;
 constexpr size_t seconds_fitted = 3;  ///< beside the best single effect that was fitted
-/// Of 2 ln likelihood by an effect, below which its prior odds alone speak against it.
-const double least_gain = 2.0 * std::log(1.0 / effect_odds);
 constexpr double second_in_reach =
     50.0;  ///< nats behind the best of its size, beyond which a set is not taken again
 constexpr size_t refitted_sets = 2;  ///< best sets of each size, fitted with tolerances that are not linear
-constexpr double least_amplitude = 0.5,
-                 most_amplitude = 2.0;  ///< of a response: beyond, another size stands for it
-
-/// Responses that together promise a gain.
-struct ScreenedSet {
-  double gain = 0.0;  ///< of 2 ln likelihood
-  std::vector<size_t> responses;
-};
-
-/// Screened gains are right within their sizes' spacing: what promises half of the best, or is among the first, may turn out best.
-bool is_worth_fitting(const std::vector<ScreenedSet>& sorted, size_t i, double least) {
-  constexpr size_t first = 3;
-  return sorted[i].gain > least && (i < first || sorted[i].gain > 0.5 * sorted.front().gain);
-}
-
-/// Products of what responses and misfit have beyond the nuisances, in sds.
-class Screening {
- public:
-  Screening(const std::vector<Response>& responses, const VectorXd& misfit, const MatrixXd& columns,
-            const rig::EvidenceFit& under) {
-    const VectorXd weight = under.variance.cwiseSqrt().cwiseInverse();
-    MatrixXd all(misfit.size(), static_cast<Index>(responses.size()) + 1);
-    all.col(0) = misfit;
-    for (size_t i = 0; i < responses.size(); ++i)
-      all.col(static_cast<Index>(i) + 1) = responses[i].change;
-    all = weight.asDiagonal() * all;
-    const MatrixXd known = weight.asDiagonal() * columns;
-    const MatrixXd mixed = known.transpose() * all;
-    products_ = all.transpose() * all - mixed.transpose() * under.precision.llt().solve(mixed);
-  }
-  [[nodiscard]] double single(size_t i) const {
-    const double a = amplitude(along(i), square(i));
-    return a * (2.0 * along(i) - a * square(i));
-  }
-  [[nodiscard]] double pair(size_t i, size_t j) const {
-    const double both = product(i, j);
-    double a = 1.0;
-    double b = 1.0;
-    for (int round = 0; round < 6; ++round) {  // of a box-bounded quadratic, from its middle
-      a = amplitude(along(i) - b * both, square(i));
-      b = amplitude(along(j) - a * both, square(j));
-    }
-    return 2.0 * (a * along(i) + b * along(j)) - a * a * square(i) - b * b * square(j) - 2.0 * a * b * both;
-  }
-
-  struct Joined {
-    double gain = 0.0;          ///< of 2 ln likelihood
-    double log_evidence = 0.0;  ///< gained where each amplitude's prior is as wide as the amplitude
-  };
-  /// Responses together, of any amplitudes that are not negative.
-  [[nodiscard]] Joined joined(std::vector<size_t> responses) const {
-    const auto count = static_cast<Index>(responses.size());
-    if (count == 0) return {};
-    VectorXd b(count);
-    MatrixXd squares(count, count);
-    for (Index i = 0; i < count; ++i) {
-      b[i] = along(responses[static_cast<size_t>(i)]);
-      for (Index j = 0; j < count; ++j)
-        squares(i, j) = product(responses[static_cast<size_t>(i)], responses[static_cast<size_t>(j)]);
-    }
-    const VectorXd amplitudes = squares.ldlt().solve(b);
-    Index least = 0;
-    if (!(amplitudes.minCoeff(&least) > 0.0)) {
-      responses.erase(responses.begin() + least);
-      return joined(std::move(responses));
-    }
-    MatrixXd with_prior = squares;
-    with_prior.diagonal() += amplitudes.cwiseAbs2().cwiseInverse();
-    const MatrixXd scaled = amplitudes.asDiagonal() * with_prior * amplitudes.asDiagonal();
-    return {.gain = amplitudes.dot(b),
-            .log_evidence = 0.5 * (b.dot(with_prior.ldlt().solve(b)) - std::log(scaled.determinant()))};
-  }
-
- private:
-  [[nodiscard]] double product(size_t i, size_t j) const {
-    return products_(static_cast<Index>(i) + 1, static_cast<Index>(j) + 1);
-  }
-  [[nodiscard]] double along(size_t i) const { return products_(0, static_cast<Index>(i) + 1); }
-  [[nodiscard]] double square(size_t i) const { return product(i, i); }
-  static double amplitude(double along, double square) {
-    return square > 0.0 ? std::clamp(along / square, least_amplitude, most_amplitude) : 1.0;
-  }
-  MatrixXd products_;
-};
-
-/// The best gain of each set of ids, the largest first.
-class ScreenedSets {
- public:
-  explicit ScreenedSets(const std::vector<Response>& responses) : responses_(responses) {}
-  void add(ScreenedSet candidate) {
-    std::vector<std::string_view> ids;
-    for (const size_t i : candidate.responses)
-      ids.push_back(responses_[i].term.effect->text().id);
-    std::ranges::sort(ids);
-    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-    ScreenedSet& best = best_[ids];
-    if (candidate.gain > best.gain) best = std::move(candidate);
-  }
-  [[nodiscard]] std::vector<ScreenedSet> sorted() const {
-    std::vector<ScreenedSet> list;
-    for (const auto& [ids, candidate] : best_)
-      if (!candidate.responses.empty()) list.push_back(candidate);
-    std::ranges::sort(list, std::greater(), &ScreenedSet::gain);
-    return list;
-  }
-
- private:
-  const std::vector<Response>& responses_;
-  std::map<std::vector<std::string_view>, ScreenedSet> best_;
-};
-
 class SetSearch {
  public:
   SetSearch(const rig::SessionProblem& problem, const SetSearchOptions& options)
@@ -200,17 +88,10 @@ class SetSearch {
   void fit_plain_and_singles_again();
   [[nodiscard]] bool is_plain_near() const;
   [[nodiscard]] bool is_plain_in_reach() const;
-  [[nodiscard]] bool has_response(const Effect* effect) const;
-  [[nodiscard]] bool relieves(const Effect* effect, const EffectSet& set) const;
-  [[nodiscard]] Screening::Joined most_joined(const Screening& screening,
-                                              std::span<const Effect* const> effects,
-                                              const std::vector<size_t>& chosen) const;
-  [[nodiscard]] std::optional<double> posterior_beside_part(const EffectSet& set) const;
   [[nodiscard]] bool is_fitted(const std::vector<const Effect*>& effects) const;
-  [[nodiscard]] std::vector<ScreenedSet> screened_sets(const Screening& screening, bool pairs) const;
   /// From the base.
   [[nodiscard]] std::vector<ScreenedSet> screened_sets(const rig::EvidenceFit& under, bool pairs) const {
-    return screened_sets(Screening(responses_, base_.target(problem_), base_.columns, under), pairs);
+    return Screening(responses_, base_.target(problem_), base_.columns, under).sets(pairs);
   }
   /// The most probable first; what has no solution is no set.
   void sort_sets() {
@@ -226,17 +107,6 @@ class SetSearch {
   std::vector<Response> responses_;
   std::vector<EffectSet> sets_;
 };
-
-std::vector<ScreenedSet> SetSearch::screened_sets(const Screening& screening, bool pairs) const {
-  ScreenedSets best(responses_);
-  for (size_t i = 0; i < responses_.size(); ++i) {
-    if (!pairs) best.add({screening.single(i), {i}});
-    for (size_t j = i + 1; j < responses_.size(); ++j)
-      if ((responses_[i].term.effect != responses_[j].term.effect) == pairs)
-        best.add({screening.pair(i, j), {i, j}});
-  }
-  return best.sorted();
-}
 
 bool SetSearch::is_fitted(const std::vector<const Effect*>& effects) const {
   return std::ranges::any_of(sets_, [&](const EffectSet& set) {
@@ -326,11 +196,8 @@ void SetSearch::fit_beside_best() {
   if (best == nullptr) return;
   const EffectSet first = *best;
   const Screening screening(responses_, first.target(), first.columns, first.evidence);
-  ScreenedSets seconds(responses_);
-  for (size_t i = 0; i < responses_.size(); ++i)
-    if (responses_[i].term.effect != first.model.terms.back().effect) seconds.add({screening.single(i), {i}});
   size_t count = 0;
-  for (const ScreenedSet& candidate : seconds.sorted()) {
+  for (const ScreenedSet& candidate : screening.singles_but(first.model.terms.back().effect)) {
     if (++count > seconds_fitted || candidate.gain < least_gain) break;
     const Response& response = responses_[candidate.responses.front()];
     if (is_fitted({first.model.terms.back().effect, response.term.effect})) continue;
@@ -358,76 +225,6 @@ void SetSearch::fit_synergies() {
   }
 }
 
-/// Is more than half of what an effect changes what a tolerance changes that is so far off in a set that the effect may be the more
-/// probable of both? What the two leave of each other no linear algebra shows: their curvature is more.
-bool SetSearch::relieves(const Effect* effect, const EffectSet& set) const {
-  const VectorXd weight = set.evidence.variance.cwiseSqrt().cwiseInverse();
-  const Index tolerances = set.model.u.size() - static_cast<Index>(rig::basic_nuisances);
-  for (Index i = 0; i < tolerances; ++i) {
-    if (std::pow(set.model.u.tail(tolerances)[i], 2) < least_gain) continue;
-    const VectorXd strained = weight.cwiseProduct(set.columns.rightCols(tolerances).col(i)).normalized();
-    for (const Response& response : responses_)
-      if (response.term.effect == effect &&
-          std::pow(strained.dot(weight.cwiseProduct(response.change).normalized()), 2) > 0.5)
-        return true;
-  }
-  return false;
-}
-
-/// What moments do has none.
-bool SetSearch::has_response(const Effect* effect) const {
-  return effect->change_points() == ChangePoints::none &&
-         std::ranges::any_of(responses_,
-                             [&](const Response& response) { return response.term.effect == effect; });
-}
-
-/// The most that responses of these effects promise together, one of each.
-Screening::Joined SetSearch::most_joined(const Screening& screening, std::span<const Effect* const> effects,
-                                         const std::vector<size_t>& chosen) const {
-  if (effects.empty()) return screening.joined(chosen);
-  Screening::Joined most;
-  for (size_t i = 0; i < responses_.size(); ++i) {
-    if (responses_[i].term.effect != effects.front()) continue;
-    std::vector<size_t> with = chosen;
-    with.push_back(i);
-    const Screening::Joined joined = most_joined(screening, effects.subspan(1), with);
-    if (joined.gain > most.gain) most = joined;
-  }
-  return most;
-}
-
-/// The log posterior of a set of which a part was fitted exactly and explains more, by linear algebra there: what it lacks at its
-/// best sizes, which are its priors' sds, too. None if that promises more than its prior odds cost.
-std::optional<double> SetSearch::posterior_beside_part(const EffectSet& set) const {
-  const auto is_in = [](const Effect* effect, const EffectSet& of) {
-    return std::ranges::count(of.model.terms, effect, &rig::ModelTerm::effect) > 0;
-  };
-  for (const EffectSet& part : sets_) {
-    const bool is_part =
-        added(part) < added(set) && std::ranges::all_of(part.model.terms, [&](const rig::ModelTerm& term) {
-          return is_in(term.effect, set);
-        });
-    if (!part.exact || !is_part || part.log_posterior < set.log_posterior) continue;
-    std::vector<const Effect*> others;
-    for (const rig::ModelTerm& term : set.model.terms)
-      if (!is_in(term.effect, part)) others.push_back(term.effect);
-    const auto is_nonlinear = [&](const Effect* other) {
-      return !has_response(other) || relieves(other, part) ||
-             std::ranges::any_of(set.model.terms, [&](const rig::ModelTerm& term) {
-               return only_show_together(*other, *term.effect);
-             });
-    };
-    if (std::ranges::any_of(others, is_nonlinear)) continue;
-    const Screening::Joined most =
-        most_joined(Screening(responses_, part.target(), part.columns, part.evidence), others, {});
-    const double odds =
-        set.log_posterior - set.evidence.log_evidence - (part.log_posterior - part.evidence.log_evidence);
-    if (most.gain < least_gain * static_cast<double>(others.size()))
-      return part.log_posterior + most.log_evidence + odds;
-  }
-  return {};
-}
-
 void SetSearch::fit_best_again(size_t effects) {
   sort_sets();
   size_t count = 0;
@@ -437,7 +234,7 @@ void SetSearch::fit_best_again(size_t effects) {
     if (is_behind(set) || ++count > refitted_sets ||
         (count > 1 && set.log_posterior < best - second_in_reach))
       break;
-    if (const auto posterior = posterior_beside_part(set)) {
+    if (const auto posterior = posterior_by_part(set, sets_, responses_)) {
       set.log_posterior = *posterior;
     } else {
       set = fit_set_exactly(problem_, set);
@@ -536,7 +333,7 @@ double SetSearch::posterior_if_finer(double times, const EffectSet& plain) const
   const Screening screening(responses_, target, columns, fit);
   double most = 0.0;
   for (const bool pairs : {false, true}) {
-    const std::vector<ScreenedSet> best = screened_sets(screening, pairs);
+    const std::vector<ScreenedSet> best = screening.sets(pairs);
     if (!best.empty()) most = std::max(most, 0.5 * (best.front().gain - (pairs ? 2.0 : 1.0) * least_gain));
   }
   return fit.log_evidence + most + plain.log_posterior - plain.evidence.log_evidence;

@@ -7,6 +7,7 @@
 // (ln 100 = 4.6; of both signs, over twice that), other parameters are uniform within their bounds; an effect is there
 // in one session of forty, and as many change points are possible as there are cycles.
 
+#include <cmath>
 #include <functional>
 #include <string>
 #include <vector>
@@ -19,6 +20,8 @@ namespace diastole::explain {
 
 /// That a given effect is there, in a session that somebody asks about.
 inline constexpr double effect_odds = 1.0 / 40.0;
+/// Of 2 ln likelihood by an effect, below which its prior odds alone speak against it.
+inline const double least_gain = 2.0 * std::log(1.0 / effect_odds);
 /// What a real part does differs from an effect's equations by such a share at the most: as one sd where a misfit beside the effect is
 /// judged, as two in its values' intervals (value_errors.hpp).
 inline constexpr double right_to = 0.1;
