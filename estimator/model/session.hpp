@@ -2,6 +2,7 @@
 // The runs that a study names, read for the rig's model: the motion behind the steps, the samples of each channel, the
 // gated volumes, and where in the session each run lies.
 
+#include <algorithm>
 #include <map>
 #include <vector>
 
@@ -29,6 +30,11 @@ struct SessionRun {
   std::vector<GatedVolume> volumes;
   double smoothed_mL =
       0.0;  ///< how far drive.motion is from counts that no known motion follows; 0: one does
+
+  /// Of the first sample at this time or later, to a microsecond.
+  [[nodiscard]] size_t row_at(double time_s) const {
+    return static_cast<size_t>(std::ranges::lower_bound(sample_s, time_s - 1e-6) - sample_s.begin());
+  }
 };
 
 /// Beyond these the controller refuses a motion.

@@ -10,15 +10,15 @@ LinearisedModel declared_rig(const SessionProblem& problem, SessionModel with) {
   constexpr double small = 0.03;
   constexpr int most_rounds = 3;
   LinearisedModel declared{.at = std::move(with), .there = {}, .columns = {}};
-  declared.at.u = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(problem.nuisances().size()));
+  declared.at.nuisances = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(problem.nuisances().size()));
   for (int round = 0; round < most_rounds; ++round) {
     declared.columns = problem.nuisance_columns(declared.at, declared.there);
     const EvidenceFit fit = fit_with_shares(declared.target(problem), declared.columns, problem.error(),
                                             problem.error().prior.share);
-    const double moved = std::abs(fit.u[0] - declared.at.u[0]) * problem.nuisances()[0].sd;
-    declared.at.u.head(basic_nuisances) = fit.u.head(basic_nuisances);
+    const double moved = std::abs(fit.estimate[0] - declared.at.nuisances[0]) * problem.nuisances()[0].sd;
+    declared.at.nuisances.head(basic_nuisances) = fit.estimate.head(basic_nuisances);
     if (moved < small) {
-      declared.there = problem.shown(std::span(&declared.at, 1));
+      declared.there = problem.predicted_features(std::span(&declared.at, 1));
       break;
     }
   }

@@ -16,7 +16,7 @@ struct LinearisedModel {
   }
   /// What is to be explained by all of u.
   [[nodiscard]] Eigen::VectorXd target(const SessionProblem& problem) const {
-    return misfit(problem) + columns * at.u;
+    return misfit(problem) + columns * at.nuisances;
   }
 };
 

@@ -73,7 +73,7 @@ BandChange in_band(const VectorXd& difference, const ChannelNoise& noise, double
   return out;
 }
 
-CycleScatter scatter_of(const SessionProblem& problem, const std::vector<Shown>& shown_by_run,
+CycleScatter scatter_of(const SessionProblem& problem, const std::vector<RunPrediction>& predicted_by_run,
                         Channel channel) {
   const bool cavity = channel == Channel::cavity;
   const ChannelNoise& noise = problem.noise().channels.at(channel);
@@ -88,7 +88,7 @@ CycleScatter scatter_of(const SessionProblem& problem, const std::vector<Shown>&
     const SessionRun& run = problem.session().runs[r];
     if (!run.pressure_kPa.contains(channel)) continue;
     const std::vector<double>& measured = run.pressure_kPa.at(channel);
-    const Prediction& both = shown_by_run[r].pressures;
+    const Prediction& both = predicted_by_run[r].pressures;
     const std::vector<double>& shown = cavity ? both.cavity_kPa : both.pump_kPa;
     for (size_t s = 0; s < run.segments.size(); ++s) {
       const std::vector<CycleRows> cycles = settled_cycles(run, run.segments[s]);
@@ -145,8 +145,8 @@ CycleScatter scatter_of(const SessionProblem& problem, const std::vector<Shown>&
 }  // namespace
 
 std::vector<CycleScatter> cycle_scatter(const SessionProblem& problem, const SessionModel& model) {
-  std::vector<Shown> shown(problem.session().runs.size());
-  parallel_for(shown.size(), problem.threads(), [&](size_t r) { shown[r] = problem.shown_in(r, model); });
+  std::vector<RunPrediction> shown(problem.session().runs.size());
+  parallel_for(shown.size(), problem.threads(), [&](size_t r) { shown[r] = problem.predict_run(r, model); });
   std::vector<CycleScatter> list;
   for (const auto& [channel, noise] : problem.noise().channels)
     if (CycleScatter found = scatter_of(problem, shown, channel); !found.segments.empty())

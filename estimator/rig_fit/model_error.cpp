@@ -126,9 +126,9 @@ EvidenceFit solve(const VectorXd& z, const Eigen::MatrixXd& columns, const Model
   fit.precision = columns.transpose() * weighted;
   fit.precision.diagonal().array() += 1.0;
   const Eigen::LLT<Eigen::MatrixXd> factor(fit.precision);
-  fit.u = factor.solve(weighted.transpose() * z);
-  fit.left = z - columns * fit.u;
-  fit.chi_square = fit.left.cwiseAbs2().dot(weight) + fit.u.squaredNorm();
+  fit.estimate = factor.solve(weighted.transpose() * z);
+  fit.left = z - columns * fit.estimate;
+  fit.chi_square = fit.left.cwiseAbs2().dot(weight) + fit.estimate.squaredNorm();
   const double determinant = 2.0 * factor.matrixLLT().diagonal().array().log().sum();
   fit.log_evidence = -0.5 * (fit.chi_square + determinant + fit.variance.array().log().sum());
   const Shares sigmas = fit.surprise(error.prior);

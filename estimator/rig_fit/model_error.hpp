@@ -46,7 +46,7 @@ ModelError model_error_of(const SegmentFeatures& features);
 
 /// A fit of linear unknowns whose priors are N(0, 1).
 struct EvidenceFit {
-  Eigen::VectorXd u;
+  Eigen::VectorXd estimate;   ///< the most probable u
   Eigen::MatrixXd precision;  ///< of u
   Eigen::VectorXd left;       ///< z - K u
   Eigen::VectorXd variance;   ///< D + share^2 size^2

@@ -14,11 +14,6 @@ namespace {
 constexpr size_t order = 6;
 constexpr double shortest_rest_s = 1.0;
 
-size_t row_at(const SessionRun& run, double time_s) {
-  return static_cast<size_t>(std::lower_bound(run.sample_s.begin(), run.sample_s.end(), time_s - 1e-6) -
-                             run.sample_s.begin());
-}
-
 /// Sums of products at each lag with their counts, NaN left out.
 struct Autocovariance {
   std::array<double, order + 1> sum{};
@@ -42,7 +37,7 @@ std::vector<double> rest_of(const SessionRun& run, const std::vector<double>& va
   const auto& strokes = run.drive.motion.strokes();
   const double end_s =
       strokes.empty() ? run.sample_s.back() : strokes.front().start_s - run.drive.motion.spread_s();
-  const size_t last = row_at(run, end_s);
+  const size_t last = run.row_at(end_s);
   if (last == 0 || run.sample_s[last - 1] - run.sample_s.front() < shortest_rest_s) return {};
   std::vector<double> rest(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(last));
   double mean = 0.0;
@@ -262,7 +257,7 @@ std::vector<CycleRows> cycles_of(const SessionRun& run) {
     for (const runfile::Segment& segment : run.segments)
       if (triggers[k] < segment.end_s() - 1e-6 && triggers[k] >= segment.start_s - 1e-6)
         end_s = std::min(end_s, triggers[k] + segment.period_s);
-    const CycleRows rows{row_at(run, triggers[k]), row_at(run, end_s)};
+    const CycleRows rows{run.row_at(triggers[k]), run.row_at(end_s)};
     if (rows.last > rows.first) cycles.push_back(rows);
   }
   return cycles;

@@ -209,6 +209,82 @@ void raise_noise_of_cycles(FeatureBlock& block, const Eigen::VectorXd& measured)
   }
 }
 
+/// A block for each segment and pressure of a run, without features as yet; none of what is too short.
+void add_pressure_blocks(size_t r, const SessionRun& run, std::vector<FeatureBlock>& blocks) {
+  for (size_t s = 0; s < run.segments.size(); ++s) {
+    const runfile::Segment& segment = run.segments[s];
+    FeatureBlock block{.run = r,
+                       .segment = s,
+                       .at_rest = segment.waveform == "hold",
+                       .cycles = static_cast<double>(std::max<int64_t>(segment.cycles, 1)),
+                       .period_s = segment.period_s,
+                       .key = {},
+                       .features = {},
+                       .first_row = run.row_at(segment.start_s),
+                       .rows = 0,
+                       .basis = {},
+                       .factor = {}};
+    if (run.row_at(segment.end_s()) <= block.first_row || block.period_s * block.cycles < least_s) continue;
+    for (const Signal signal : {Signal::cavity, Signal::pump}) {
+      if (!run.pressure_kPa.contains(static_cast<Channel>(signal))) continue;
+      block.signal = signal;
+      block.key = key_of(segment, signal);
+      blocks.push_back(block);
+    }
+  }
+}
+
+/// A block for each gated volume of a run, of the segment in which it begins.
+void add_volume_blocks(size_t r, const SessionRun& run, std::vector<FeatureBlock>& blocks) {
+  for (size_t v = 0; v < run.volumes.size(); ++v) {
+    const GatedVolume& volume = run.volumes[v];
+    if (volume.measured.phase_s.size() < 8) continue;
+    size_t s = 0;
+    while (s + 1 < run.segments.size() && volume.trigger_s.front() >= run.segments[s].end_s() - 1e-6)
+      ++s;
+    blocks.push_back({.run = r,
+                      .segment = s,
+                      .signal = Signal::volume,
+                      .period_s = run.segments[s].period_s,
+                      .key = key_of(run.segments[s], Signal::volume),
+                      .features = {},
+                      .first_row = v,
+                      .rows = 0,
+                      .basis = {},
+                      .factor = {}});
+  }
+}
+
+/// The block's range, features and their noise.
+void describe_volume(FeatureBlock& block, const SessionRun& run) {
+  const GatedVolume& volume = run.volumes[block.first_row];
+  block.range = range_of(volume.measured.cavity_mL, 0, volume.measured.cavity_mL.size());
+  set_volume_basis(block, volume);
+  for (Feature& feature : block.features)
+    feature.noise_sd = volume.measured.sigma_mL.front();
+}
+
+void describe_pressure(FeatureBlock& block, const SessionRun& run, const NoiseModel& noise) {
+  const auto channel = static_cast<Channel>(block.signal);
+  const std::vector<double>& values = run.pressure_kPa.at(channel);
+  const size_t last = run.row_at(run.segments[block.segment].end_s());
+  block.range = range_of(values, block.first_row, last);
+  set_basis(block, run, values, last);
+  const double rate_Hz =
+      static_cast<double>(run.sample_s.size() - 1) / (run.sample_s.back() - run.sample_s.front());
+  set_noise(block, noise.channels.at(channel), noise.cycle_sd, rate_Hz);
+}
+
+/// What was measured in a run, in a prediction's place.
+RunPrediction as_recorded(const SessionRun& run) {
+  RunPrediction recorded;
+  for (const auto& [channel, values] : run.pressure_kPa)
+    (channel == Channel::cavity ? recorded.pressures.cavity_kPa : recorded.pressures.pump_kPa) = values;
+  for (const GatedVolume& volume : run.volumes)
+    recorded.volumes.push_back(volume.measured.cavity_mL);
+  return recorded;
+}
+
 }  // namespace
 
 std::string_view name_of(Signal signal) {
@@ -218,87 +294,21 @@ std::string_view name_of(Signal signal) {
 
 SegmentFeatures::SegmentFeatures(const Session& session, const NoiseModel& noise, size_t threads) {
   for (size_t r = 0; r < session.runs.size(); ++r) {
-    const SessionRun& run = session.runs[r];
-    const auto row_at = [&](double time_s) {
-      return static_cast<size_t>(std::ranges::lower_bound(run.sample_s, time_s - 1e-6) -
-                                 run.sample_s.begin());
-    };
-    for (size_t s = 0; s < run.segments.size(); ++s) {
-      const runfile::Segment& segment = run.segments[s];
-      FeatureBlock block{.run = r,
-                         .segment = s,
-                         .at_rest = segment.waveform == "hold",
-                         .cycles = static_cast<double>(std::max<int64_t>(segment.cycles, 1)),
-                         .period_s = segment.period_s,
-                         .key = {},
-                         .features = {},
-                         .first_row = row_at(segment.start_s),
-                         .rows = 0,
-                         .basis = {},
-                         .factor = {}};
-      if (row_at(segment.end_s()) <= block.first_row || block.period_s * block.cycles < least_s) continue;
-      for (const Signal signal : {Signal::cavity, Signal::pump}) {
-        if (!run.pressure_kPa.contains(static_cast<Channel>(signal))) continue;
-        block.signal = signal;
-        block.key = key_of(segment, signal);
-        blocks_.push_back(block);
-      }
-    }
-    for (size_t v = 0; v < run.volumes.size(); ++v) {
-      const GatedVolume& volume = run.volumes[v];
-      if (volume.measured.phase_s.size() < 8) continue;
-      size_t s = 0;
-      while (s + 1 < run.segments.size() && volume.trigger_s.front() >= run.segments[s].end_s() - 1e-6)
-        ++s;
-      FeatureBlock block{.run = r,
-                         .segment = s,
-                         .signal = Signal::volume,
-                         .period_s = run.segments[s].period_s,
-                         .key = key_of(run.segments[s], Signal::volume),
-                         .features = {},
-                         .first_row = v,
-                         .rows = 0,
-                         .basis = {},
-                         .factor = {}};
-      blocks_.push_back(std::move(block));
-    }
+    add_pressure_blocks(r, session.runs[r], blocks_);
+    add_volume_blocks(r, session.runs[r], blocks_);
   }
   parallel_for(blocks_.size(), threads, [&](size_t b) {
     FeatureBlock& block = blocks_[b];
     const SessionRun& run = session.runs[block.run];
-    if (block.signal == Signal::volume) {
-      const GatedVolume& volume = run.volumes[block.first_row];
-      block.range = range_of(volume.measured.cavity_mL, 0, volume.measured.cavity_mL.size());
-      set_volume_basis(block, volume);
-      for (Feature& feature : block.features)
-        feature.noise_sd = volume.measured.sigma_mL.front();
-      return;
-    }
-    const auto channel = static_cast<Channel>(block.signal);
-    const std::vector<double>& values = run.pressure_kPa.at(channel);
-    const double end_s = run.segments[block.segment].end_s();
-    const auto last =
-        static_cast<size_t>(std::ranges::lower_bound(run.sample_s, end_s - 1e-6) - run.sample_s.begin());
-    block.range = range_of(values, block.first_row, last);
-    set_basis(block, run, values, last);
-    const double rate_Hz =
-        static_cast<double>(run.sample_s.size() - 1) / (run.sample_s.back() - run.sample_s.front());
-    set_noise(block, noise.channels.at(channel), noise.cycle_sd, rate_Hz);
+    block.signal == Signal::volume ? describe_volume(block, run) : describe_pressure(block, run, noise);
   });
   for (FeatureBlock& block : blocks_) {
     block.first = count_;
     count_ += block.features.size();
   }
   measured_.resize(count());
-  for (size_t r = 0; r < session.runs.size(); ++r) {
-    const SessionRun& run = session.runs[r];
-    Shown shown;
-    for (const auto& [channel, values] : run.pressure_kPa)
-      (channel == Channel::cavity ? shown.pressures.cavity_kPa : shown.pressures.pump_kPa) = values;
-    for (const GatedVolume& volume : run.volumes)
-      shown.volumes.push_back(volume.measured.cavity_mL);
-    project(r, std::array{shown}, measured_);
-  }
+  for (size_t r = 0; r < session.runs.size(); ++r)
+    project(r, std::array{as_recorded(session.runs[r])}, measured_);
   for (FeatureBlock& block : blocks_)
     raise_noise_of_cycles(block, measured_);
 }
@@ -328,7 +338,7 @@ Eigen::VectorXd SegmentFeatures::series(const FeatureBlock& block, const Eigen::
   return values;
 }
 
-void SegmentFeatures::project(size_t run, std::span<const Shown> shown,
+void SegmentFeatures::project(size_t run, std::span<const RunPrediction> shown,
                               Eigen::Ref<Eigen::MatrixXd> out) const {
   for (const FeatureBlock& block : blocks_) {
     if (block.run != run) continue;

@@ -65,7 +65,7 @@ struct FeatureBlock {
 };
 
 /// What the instruments show of one run.
-struct Shown {
+struct RunPrediction {
   Prediction pressures;
   std::vector<std::vector<double>> volumes;  ///< as SessionRun::volumes
 };
@@ -78,7 +78,7 @@ class SegmentFeatures {
   [[nodiscard]] Eigen::Index count() const { return static_cast<Eigen::Index>(count_); }
   [[nodiscard]] const Eigen::VectorXd& measured() const { return measured_; }
   /// Sets the features of one run; a column for each of several models, whose projections are faster together.
-  void project(size_t run, std::span<const Shown> shown, Eigen::Ref<Eigen::MatrixXd> out) const;
+  void project(size_t run, std::span<const RunPrediction> shown, Eigen::Ref<Eigen::MatrixXd> out) const;
   /// The same of series of one block's rows, a column each.
   [[nodiscard]] static Eigen::MatrixXd project(const FeatureBlock& block, const Eigen::MatrixXd& values);
   /// The series that has these features and nothing else.

@@ -84,7 +84,7 @@ RigModel SessionProblem::model(const SessionModel& of, const Eigen::VectorXd& of
   RigModel model = session_.base;
   model.curve = family_.plain();
   const auto value = [&](size_t i) {
-    const double u = i < basic_nuisances ? of.u[static_cast<Eigen::Index>(i)]
+    const double u = i < basic_nuisances ? of.nuisances[static_cast<Eigen::Index>(i)]
                                          : offsets[static_cast<Eigen::Index>(i - basic_nuisances)];
     return nuisances_[i].mean + nuisances_[i].sd * u;
   };
@@ -108,9 +108,9 @@ PlantTrace SessionProblem::plant(const RigModel& model, size_t run) const {
   return simulate_plant(model, session_.runs[run].drive, motion, {.step_s = motion.step_s, .components = 3});
 }
 
-Shown SessionProblem::shown_in(size_t run, const RigModel& model, const PlantTrace& plant) const {
+RunPrediction SessionProblem::predict_run(size_t run, const RigModel& model, const PlantTrace& plant) const {
   const SessionRun& recorded = session_.runs[run];
-  Shown shown{observe(model, plant, recorded.drive.place, recorded.sample_s), {}};
+  RunPrediction shown{observe(model, plant, recorded.drive.place, recorded.sample_s), {}};
   for (const GatedVolume& volume : recorded.volumes) {
     shown.volumes.emplace_back();
     for (const double phase : volume.measured.phase_s) {
@@ -123,21 +123,21 @@ Shown SessionProblem::shown_in(size_t run, const RigModel& model, const PlantTra
   return shown;
 }
 
-Shown SessionProblem::shown_in(size_t run, const SessionModel& of) const {
+RunPrediction SessionProblem::predict_run(size_t run, const SessionModel& of) const {
   const RigModel made = model(of);
-  return shown_in(run, made, plant(made, run));
+  return predict_run(run, made, plant(made, run));
 }
 
-Eigen::MatrixXd SessionProblem::shown(std::span<const SessionModel> models,
-                                      const std::vector<bool>& same_plant) const {
+Eigen::MatrixXd SessionProblem::predicted_features(std::span<const SessionModel> models,
+                                                   const std::vector<bool>& same_plant) const {
   std::vector<RigModel> made;
   for (const SessionModel& of : models)
     made.push_back(model(of));
-  return shown(made, same_plant);
+  return predicted_features(made, same_plant);
 }
 
-Eigen::MatrixXd SessionProblem::shown(std::span<const RigModel> made,
-                                      const std::vector<bool>& same_plant) const {
+Eigen::MatrixXd SessionProblem::predicted_features(std::span<const RigModel> made,
+                                                   const std::vector<bool>& same_plant) const {
   const size_t runs = session_.runs.size();
   std::vector<PlantTrace> first(same_plant.empty() ? 0 : runs);
   parallel_for(first.size(), threads_, [&](size_t r) { first[r] = plant(made.front(), r); });
@@ -146,10 +146,10 @@ Eigen::MatrixXd SessionProblem::shown(std::span<const RigModel> made,
   parallel_for((made.size() + together - 1) / together * runs, threads_, [&](size_t task) {
     const size_t r = task % runs;
     const size_t from = task / runs * together;
-    std::vector<Shown> seen;
+    std::vector<RunPrediction> seen;
     for (size_t m = from; m < std::min(from + together, made.size()); ++m) {
       const bool kept = !same_plant.empty() && (m == 0 || same_plant[m]);
-      seen.push_back(kept ? shown_in(r, made[m], first[r]) : shown_in(r, made[m], plant(made[m], r)));
+      seen.push_back(kept ? predict_run(r, made[m], first[r]) : predict_run(r, made[m], plant(made[m], r)));
     }
     features_.project(
         r, seen, out.middleCols(static_cast<Eigen::Index>(from), static_cast<Eigen::Index>(seen.size())));
@@ -170,7 +170,7 @@ std::vector<RigModel> SessionProblem::stepped(const SessionModel& at, const Eige
   for (Eigen::Index i = 0; i < steps.size(); ++i) {
     SessionModel moved = at;
     Eigen::VectorXd offsets = from;
-    (i < basic ? moved.u[i] : offsets[i - basic]) += steps[i];
+    (i < basic ? moved.nuisances[i] : offsets[i - basic]) += steps[i];
     models.push_back(model(moved, offsets));
   }
   return models;
@@ -197,7 +197,7 @@ Eigen::MatrixXd SessionProblem::differences(const SessionModel& at, double part,
   };
   add(steps);
   if (both_sides) add(-steps);
-  const Eigen::MatrixXd all = shown(models, same_plant);
+  const Eigen::MatrixXd all = predicted_features(models, same_plant);
   there = all.col(0);
   const Eigen::MatrixXd after = all.middleCols(1, steps.size());
   if (both_sides)

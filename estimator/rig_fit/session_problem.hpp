@@ -23,8 +23,8 @@ struct TolerancePrior {
 /// reference says more of the tolerances, theirs are independent combinations of them.
 struct SessionModel {
   std::vector<ModelTerm> terms;
-  std::vector<double> values;  ///< of the effects, natural
-  Eigen::VectorXd u;
+  std::vector<double> values;                        ///< of the effects, natural
+  Eigen::VectorXd nuisances;                         ///< u, in sds of their priors
   std::shared_ptr<const TolerancePrior> prior = {};  ///< where it is not the problem's
 };
 
@@ -74,7 +74,7 @@ class SessionProblem {
   }
   /// The tolerances of a model, in sds of their list's.
   [[nodiscard]] Eigen::VectorXd tolerances(const SessionModel& of) const {
-    return prior(of).mean + prior(of).root * of.u.tail(prior(of).mean.size());
+    return prior(of).mean + prior(of).root * of.nuisances.tail(prior(of).mean.size());
   }
   [[nodiscard]] const ModelError& error() const { return error_; }
   [[nodiscard]] const std::vector<Nuisance>& nuisances() const { return nuisances_; }
@@ -83,8 +83,8 @@ class SessionProblem {
   [[nodiscard]] RigModel model(const SessionModel& of) const;
   /// Features that models would show, a column each. Those for which `same_plant` is set differ from the first one
   /// only in what the sensors show.
-  [[nodiscard]] Eigen::MatrixXd shown(std::span<const SessionModel> models,
-                                      const std::vector<bool>& same_plant = {}) const;
+  [[nodiscard]] Eigen::MatrixXd predicted_features(std::span<const SessionModel> models,
+                                                   const std::vector<bool>& same_plant = {}) const;
   /// How what is shown changes with u, by differences of half a tolerance's sd: the range that a linear fit goes through.
   /// `there`: what is shown at it.
   [[nodiscard]] Eigen::MatrixXd nuisance_columns(const SessionModel& at, Eigen::VectorXd& there) const;
@@ -95,7 +95,7 @@ class SessionProblem {
   [[nodiscard]] Eigen::MatrixXd nuisance_slopes(const SessionModel& at, Eigen::VectorXd& there,
                                                 bool both_sides = false) const;
   /// What the instruments show of one run.
-  [[nodiscard]] Shown shown_in(size_t run, const SessionModel& of) const;
+  [[nodiscard]] RunPrediction predict_run(size_t run, const SessionModel& of) const;
 
  private:
   /// Steps of this part of an sd, of u's first and of the tolerances one by one.
@@ -109,10 +109,10 @@ class SessionProblem {
   [[nodiscard]] Eigen::MatrixXd by_u(const SessionModel& at, Eigen::MatrixXd by_steps) const;
   /// With these tolerances, in sds of their list's, whatever u says.
   [[nodiscard]] RigModel model(const SessionModel& of, const Eigen::VectorXd& tolerances) const;
-  [[nodiscard]] Eigen::MatrixXd shown(std::span<const RigModel> made,
-                                      const std::vector<bool>& same_plant) const;
+  [[nodiscard]] Eigen::MatrixXd predicted_features(std::span<const RigModel> made,
+                                                   const std::vector<bool>& same_plant) const;
   [[nodiscard]] PlantTrace plant(const RigModel& model, size_t run) const;
-  [[nodiscard]] Shown shown_in(size_t run, const RigModel& model, const PlantTrace& plant) const;
+  [[nodiscard]] RunPrediction predict_run(size_t run, const RigModel& model, const PlantTrace& plant) const;
 
   const Session& session_;
   const SpecimenFamily& family_;

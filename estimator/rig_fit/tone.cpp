@@ -91,9 +91,7 @@ std::optional<Window> window_of(const Session& session, size_t r, size_t s) {
   const std::vector<double>& values = run.pressure_kPa.at(Channel::cavity);
   const double rate_Hz =
       static_cast<double>(run.sample_s.size() - 1) / (run.sample_s.back() - run.sample_s.front());
-  const auto first =
-      static_cast<size_t>(std::ranges::lower_bound(run.sample_s, segment.start_s + segment.period_s - 1e-6) -
-                          run.sample_s.begin());
+  const auto first = run.row_at(segment.start_s + segment.period_s);
   const auto cycles = static_cast<size_t>(segment.cycles - 1);
   const auto rows =
       static_cast<size_t>(std::lround(static_cast<double>(cycles) * segment.period_s * rate_Hz));

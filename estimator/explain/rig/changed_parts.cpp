@@ -32,7 +32,7 @@ FreedStart free_changed_parts(const rig::SessionProblem& problem, rig::SessionMo
       rig::TolerancePrior{learnt.mean, covariance.llt().matrixL(), learnt.described});
   const auto free = prior->root.triangularView<Eigen::Lower>();
   const auto convert = [&](rig::SessionModel& model) {
-    model.u.tail(count) = free.solve(before * model.u.tail(count)).eval();
+    model.nuisances.tail(count) = free.solve(before * model.nuisances.tail(count)).eval();
     model.prior = prior;
   };
   convert(start);

@@ -182,7 +182,7 @@ class ResponseScan {
       models.back().values.insert(models.back().values.end(), values.begin(), values.end());
       same_plant.push_back(variant.effect->stage() == Stage::sensors);
     }
-    const Eigen::MatrixXd shown = problem_.shown(models, same_plant);
+    const Eigen::MatrixXd shown = problem_.predicted_features(models, same_plant);
     for (size_t i = 0; i < made.size(); ++i) {
       made[i].response.change = shown.col(static_cast<Eigen::Index>(i + 1)) - known_.there;
       const VectorXd own = magnitudes(problem_.features(), made[i].response.change.cwiseQuotient(scale_));

@@ -368,7 +368,7 @@ void SetSearch::search_if_finer() {
 
 WeighedSets SetSearch::run() {
   report("fitting the rig's model");
-  base_ = declared_rig(problem_, {.terms = options_.terms, .values = options_.values, .u = {}});
+  base_ = declared_rig(problem_, {.terms = options_.terms, .values = options_.values, .nuisances = {}});
   report("computing what each effect would do");
   const rig::EvidenceFit stated =
       fit_linear(base_.target(problem_), base_.columns, problem_.error(), problem_.error().prior.share);

@@ -30,23 +30,23 @@ struct EffectSet {
   rig::SessionModel model;             ///< as fitted
   std::vector<rig::Unknown> unknowns;  ///< of the effects
   std::vector<double> errors;          ///< of the effects' values, natural
-  Eigen::MatrixXd covariance;          ///< of the effects' values' coordinates, the moments and u
+  Eigen::MatrixXd covariance;          ///< of the effects' values' coordinates, the moments and nuisances
   rig::EvidenceFit evidence;
-  Eigen::VectorXd shown;       ///< features of the model
-  rig::LinearisedModel known;  ///< where the nuisances' columns were taken
-  Eigen::MatrixXd columns;     ///< of the evidence's linear unknowns: the effects', then the nuisances
+  rig::LinearisedModel
+      known;                ///< that model, what it shows, and the nuisances' columns as they were last taken
+  Eigen::MatrixXd columns;  ///< of the evidence's linear unknowns: the effects', then the nuisances
   double log_posterior = 0.0;  ///< evidence and prior
   bool exact = false;          ///< its tolerances were simulated
   inference::Termination termination = inference::Termination::no_solution;
 
   [[nodiscard]] std::vector<std::string> ids() const;  ///< sorted
   /// What the evidence's linear unknowns are to explain.
-  [[nodiscard]] Eigen::VectorXd target() const { return evidence.left + columns * evidence.u; }
+  [[nodiscard]] Eigen::VectorXd target() const { return evidence.left + columns * evidence.estimate; }
   /// The evidence's precision without the priors of the effects' values, which are no measurement of them.
   [[nodiscard]] Eigen::MatrixXd precision_by_data() const {
     constexpr double nearly_nothing = 1e-6;
     Eigen::MatrixXd precision = evidence.precision;
-    precision.diagonal().head(columns.cols() - model.u.size()).array() -= 1.0 - nearly_nothing;
+    precision.diagonal().head(columns.cols() - model.nuisances.size()).array() -= 1.0 - nearly_nothing;
     return precision;
   }
 };

@@ -50,7 +50,7 @@ EffectTrial::EffectTrial(const Effect& effect, size_t threads)
     typical_.push_back(parameter.typical);
 }
 
-rig::Prediction EffectTrial::shown(const std::optional<std::vector<double>>& values) const {
+rig::Prediction EffectTrial::predicted(const std::optional<std::vector<double>>& values) const {
   rig::RigModel model;
   model.curve = family_.plain();
   model.modulus_kPa = 8.0;
@@ -80,7 +80,7 @@ EffectCheck EffectTrial::declared() const {
 }
 
 EffectCheck EffectTrial::neutral() const {
-  const rig::Prediction base = shown({});
+  const rig::Prediction base = predicted({});
   EffectCheck check{"neutral value", true, "the base model exactly"};
   // Sizes alone make it neutral, unless it replaces what the rig has.
   rig::RigModel other;
@@ -92,7 +92,7 @@ EffectCheck EffectTrial::neutral() const {
       if (!is_amplitude(effect_, j)) no_size[j] = typical_[j];
   for (const auto& [values, what] : {std::pair{neutral_, "all parameters neutral"},
                                      std::pair{no_size, "sizes neutral, the others typical"}}) {
-    const rig::Prediction same = shown(values);
+    const rig::Prediction same = predicted(values);
     if (same.cavity_kPa == base.cavity_kPa && same.pump_kPa == base.pump_kPa) continue;
     check.passed = false;
     check.detail = is_finite(same) ? fmt::format("{}: pressures differ by {:.3g} kPa", what,
@@ -104,9 +104,9 @@ EffectCheck EffectTrial::neutral() const {
 
 EffectCheck EffectTrial::shows() const {
   constexpr double least_kPa = 0.005;
-  const rig::Prediction typical = shown(typical_);
+  const rig::Prediction typical = predicted(typical_);
   if (!is_finite(typical)) return {"visible", false, "no finite pressures where it is typical"};
-  const double largest = largest_difference_kPa(typical, shown({}));
+  const double largest = largest_difference_kPa(typical, predicted({}));
   return {"visible", largest > least_kPa, fmt::format("{:.3g} kPa where it is typical", largest)};
 }
 
@@ -117,7 +117,7 @@ EffectCheck EffectTrial::bounded() const {
     for (const double bound : {parameter.lower, parameter.upper}) {
       std::vector<double> values = typical_;
       values[j] = bound;
-      if (is_finite(shown(values))) continue;
+      if (is_finite(predicted(values))) continue;
       check.passed = false;
       check.detail = fmt::format("no finite pressures at {} = {:g}", parameter.name, bound);
     }
@@ -129,14 +129,14 @@ EffectCheck EffectTrial::differentiable() const {
   constexpr double wider = 10.0;  // the central difference's step over the fit's
   constexpr double within = 0.05;
   EffectCheck check{"differentiable", true, {}};
-  const rig::Prediction here = shown(typical_);
+  const rig::Prediction here = predicted(typical_);
   double worst = 0.0;
   for (size_t j = 0; j < typical_.size(); ++j) {
     const rig::Unknown unknown = rig::unknown_of(effect_, effect_.parameters()[j]);
     const auto moved = [&](double by) {
       std::vector<double> values = typical_;
       values[j] = unknown.value(unknown.coordinate(typical_[j]) + by);
-      return shown(values);
+      return predicted(values);
     };
     const rig::Prediction forward = moved(unknown.perturbation);
     const rig::Prediction up = moved(wider * unknown.perturbation);
@@ -196,8 +196,9 @@ EffectCheck EffectTrial::found_again() const {
   const bool is_near = off <= 5.0 * found.errors[0] + 0.02 * std::abs(options.values[0]);
   // Parameters that these data cannot distinguish may lie anywhere, if together they do what the hidden ones do, or if these
   // data are as likely with them: a bubble that a softer specimen stands for as well.
-  const rig::Prediction hidden = shown(options.values);
-  const double differs = distance_kPa(shown(found.model.values), hidden) / distance_kPa(shown({}), hidden);
+  const rig::Prediction hidden = predicted(options.values);
+  const double differs =
+      distance_kPa(predicted(found.model.values), hidden) / distance_kPa(predicted({}), hidden);
   const bool does_the_same = differs <= 0.1;  // as right as an effect's equations are taken to be
   constexpr double half_a_nat = 0.5;          // decides nothing
   const rig::LinearisedModel base = rig::declared_rig(problem);

@@ -47,7 +47,7 @@ class EffectTrial {
   [[nodiscard]] std::vector<EffectCheck> all(const std::function<void(const std::string&)>& progress) const;
 
  private:
-  [[nodiscard]] rig::Prediction shown(const std::optional<std::vector<double>>& values) const;
+  [[nodiscard]] rig::Prediction predicted(const std::optional<std::vector<double>>& values) const;
   [[nodiscard]] EffectSet fitted_without(const rig::SessionProblem& problem) const;
   [[nodiscard]] EffectSet fitted_with(const rig::SessionProblem& problem) const;
 

@@ -37,7 +37,7 @@ class EventScan {
     weight_ = weight;
     known_ = weight.asDiagonal() * before.columns;
     factor_.compute(before.evidence.precision);
-    misfit_ = weight.cwiseProduct(before.evidence.left + before.columns * before.evidence.u);
+    misfit_ = weight.cwiseProduct(before.evidence.left + before.columns * before.evidence.estimate);
     pulled_ = factor_.solve(known_.transpose() * misfit_);
     set_lasting();
   }
@@ -96,10 +96,10 @@ void EventScan::set_lasting() {
     with.terms.back().change_points.push_back(change_point({r, runs[r].sample_s.front() - 10.0}));
     if (lasts_) break;
   }
-  std::vector<rig::Shown> there(runs.size()), here(runs.size());
+  std::vector<rig::RunPrediction> there(runs.size()), here(runs.size());
   parallel_for(2 * runs.size(), problem_.threads(), [&](size_t i) {
     const size_t r = i / 2;
-    (i % 2 == 0 ? there : here)[r] = problem_.shown_in(r, i % 2 == 0 ? with : before_.model);
+    (i % 2 == 0 ? there : here)[r] = problem_.predict_run(r, i % 2 == 0 ? with : before_.model);
   });
   const auto difference = [](const std::vector<double>& a, const std::vector<double>& b) {
     return VectorXd(Eigen::Map<const VectorXd>(a.data(), static_cast<Index>(a.size())) -

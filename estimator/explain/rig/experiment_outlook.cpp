@@ -159,7 +159,7 @@ rig::SessionModel FittedModel::moved(Eigen::Index unknown, double& step) const {
   if (unknown < effects) {
     other.values[static_cast<size_t>(unknown)] = at.value(coordinates[unknown] + step);
   } else {
-    other.u[unknown - effects] += step;
+    other.nuisances[unknown - effects] += step;
   }
   return other;
 }
@@ -172,16 +172,16 @@ FittedModel fitted_model(const rig::SessionProblem& problem, const EffectSet& se
                   .errors = set.errors};
   const auto effects = static_cast<Eigen::Index>(set.model.values.size());
   const auto count = effects + static_cast<Eigen::Index>(rig::basic_nuisances);
-  const Eigen::Index first_u = set.covariance.rows() - set.model.u.size();
+  const Eigen::Index first_nuisance = set.covariance.rows() - set.model.nuisances.size();
   fit.coordinates.resize(count);
   fit.covariance.resize(count, count);
-  const auto place = [&](Eigen::Index i) { return i < effects ? i : first_u + i - effects; };
+  const auto place = [&](Eigen::Index i) { return i < effects ? i : first_nuisance + i - effects; };
   for (Eigen::Index i = 0; i < count; ++i) {
     if (i < effects) {
       const auto k = static_cast<size_t>(i);
       fit.coordinates[i] = fit.unknowns[k].coordinate(set.model.values[k]);
     } else {
-      fit.coordinates[i] = set.model.u[i - effects];
+      fit.coordinates[i] = set.model.nuisances[i - effects];
       const rig::Nuisance& nuisance = problem.nuisances()[static_cast<size_t>(i - effects)];
       fit.unknowns.push_back({{.name = nuisance.name}, 0.01, nuisance.sensors_only});
     }
@@ -277,7 +277,7 @@ Eigen::MatrixXd gram_beside(const rig::SessionProblem& problem, const FittedMode
   if (equipment[static_cast<size_t>(Observable::stiffness)] && is_lasting(truth) && is_lasting(adapting)) {
     const double sd = problem.nuisances()[0].sd;
     Eigen::VectorXd row = Eigen::VectorXd::Zero(sum.cols());
-    row[0] = sd * (truth.model.u[0] - adapting.model.u[0]) / knowledge.relative_C1_error;
+    row[0] = sd * (truth.model.nuisances[0] - adapting.model.nuisances[0]) / knowledge.relative_C1_error;
     row[1 + modulus] = sd / knowledge.relative_C1_error;
     sum += row * row.transpose();
   }

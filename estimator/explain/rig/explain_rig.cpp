@@ -153,10 +153,10 @@ void state_error(const StudyModelError& stated, rig::Shares& share) {
 std::string doubt_of_units(const rig::SessionProblem& problem) {
   constexpr double four_sds = 16.0;  // of what is known of the modulus
   rig::SessionModel stated;
-  stated.u = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(problem.nuisances().size()));
+  stated.nuisances = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(problem.nuisances().size()));
   double shown_kPa = 0.0;
   for (size_t r = 0; r < problem.session().runs.size(); ++r) {
-    const auto [least, most] = std::ranges::minmax(problem.shown_in(r, stated).pressures.cavity_kPa);
+    const auto [least, most] = std::ranges::minmax(problem.predict_run(r, stated).pressures.cavity_kPa);
     shown_kPa = std::max(shown_kPa, most - least);
   }
   const double measured_kPa = problem.error().range[static_cast<size_t>(rig::Signal::cavity)];

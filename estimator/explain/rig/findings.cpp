@@ -108,8 +108,8 @@ std::vector<ParameterShift> parameter_shifts(const rig::SessionProblem& problem,
                                              const EffectSet& after) {
   const auto value = [&](const EffectSet& set, size_t i) {
     const rig::Nuisance& nuisance = problem.nuisances()[i];
-    const double v = nuisance.mean + nuisance.sd * set.model.u[static_cast<Index>(i)];
-    const Index row = set.covariance.rows() - set.model.u.size() + static_cast<Index>(i);
+    const double v = nuisance.mean + nuisance.sd * set.model.nuisances[static_cast<Index>(i)];
+    const Index row = set.covariance.rows() - set.model.nuisances.size() + static_cast<Index>(i);
     const double error = nuisance.sd * std::sqrt(set.covariance(row, row));
     return i == 0 ? std::pair(std::exp(v), std::exp(v) * error) : std::pair(v, error);
   };
@@ -181,7 +181,7 @@ std::vector<Candidate> candidates(const EffectLibrary& known, const WeighedSets&
     Candidate row{
         set.ids(), 2.0 * (set.log_posterior - plain->log_posterior), true, set.model.values.size(), {}, ""};
     if (k == verdict.chosen) {
-      if (verdict.held_out_gain) row.held_out_drop = 2.0 * *verdict.held_out_gain;
+      if (verdict.log_pseudo_bayes_factor) row.held_out_drop = 2.0 * *verdict.log_pseudo_bayes_factor;
       row.verdict = verdict.verdict == Verdict::unexplained ? "fits best, and not well enough"
                     : verdict.verdict == Verdict::ambiguous ? "as good"
                     : verdict.verdict == Verdict::named     ? "named"
@@ -210,8 +210,8 @@ std::vector<Trace> traces(const rig::SessionProblem& problem, const EffectSet& b
   std::vector<Trace> list;
   for (size_t r = 0; r < problem.session().runs.size(); ++r) {
     const rig::SessionRun& run = problem.session().runs[r];
-    const rig::Prediction old = problem.shown_in(r, before.model).pressures;
-    const rig::Prediction now = problem.shown_in(r, after.model).pressures;
+    const rig::Prediction old = problem.predict_run(r, before.model).pressures;
+    const rig::Prediction now = problem.predict_run(r, after.model).pressures;
     for (const auto& [channel, noise] : problem.noise().channels) {
       if (!run.pressure_kPa.contains(channel)) continue;
       Trace trace;

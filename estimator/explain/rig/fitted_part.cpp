@@ -16,9 +16,9 @@ using Eigen::VectorXd;
 /// probable of both? What the two leave of each other no linear algebra shows: their curvature is more.
 bool relieves(const Effect* effect, const EffectSet& set, const std::vector<Response>& responses) {
   const VectorXd weight = set.evidence.variance.cwiseSqrt().cwiseInverse();
-  const Index tolerances = set.model.u.size() - static_cast<Index>(rig::basic_nuisances);
+  const Index tolerances = set.model.nuisances.size() - static_cast<Index>(rig::basic_nuisances);
   for (Index i = 0; i < tolerances; ++i) {
-    if (std::pow(set.model.u.tail(tolerances)[i], 2) < least_gain) continue;
+    if (std::pow(set.model.nuisances.tail(tolerances)[i], 2) < least_gain) continue;
     const VectorXd strained = weight.cwiseProduct(set.columns.rightCols(tolerances).col(i)).normalized();
     for (const Response& response : responses)
       if (response.term.effect == effect &&

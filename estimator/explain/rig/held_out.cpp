@@ -216,7 +216,8 @@ LinearFeatures smooth_discrepancy(const EffectSet& plain, const MatrixXd& functi
   return with;
 }
 
-double held_out_gain(const rig::SessionProblem& problem, const EffectSet& plain, const EffectSet& set) {
+double log_pseudo_bayes_factor(const rig::SessionProblem& problem, const EffectSet& plain,
+                               const EffectSet& set) {
   const auto freedom = [](const EffectSet& of) {
     size_t count = of.model.values.size();
     for (const rig::ModelTerm& term : of.model.terms)
@@ -240,11 +241,12 @@ double held_out_gain(const rig::SessionProblem& problem, const EffectSet& plain,
   std::vector<Index> all(static_cast<size_t>(problem.features().count()));
   std::iota(all.begin(), all.end(), Index{0});
   const LinearFeatures of_all = smooth_discrepancy(plain, functions, values, all);
-  double with = of_its_parts(set, set.evidence.u);
-  double without = of_its_parts(plain, plain.evidence.u);
+  double with = of_its_parts(set, set.evidence.estimate);
+  double without = of_its_parts(plain, plain.evidence.estimate);
   double smooth =
-      of_its_parts(plain,
-                   fit_with_shares(of_all.target, of_all.columns, problem.error(), plain.evidence.shares).u) +
+      of_its_parts(
+          plain,
+          fit_with_shares(of_all.target, of_all.columns, problem.error(), plain.evidence.shares).estimate) +
       effects * std::log(effect_odds);
   const std::vector<Fold> folds = folds_of(problem);
   for (const Fold& fold : folds) {

@@ -185,7 +185,7 @@ LawFit fit_law(const LawProblem& problem, const rig::ModelError& error, const Cu
     best.root = information.matrixL().solve(kept.transpose()).transpose();
     best.evidence = fitted(problem, error, best.root, best.evidence.shares);
   }
-  best.values = best.root * best.evidence.u.head(best.root.cols());
+  best.values = best.root * best.evidence.estimate.head(best.root.cols());
   return best;
 }
 

@@ -54,11 +54,11 @@ class LawSearch {
   [[nodiscard]] static std::vector<double> at_knots(const LawCandidate& law, const VectorXd& free);
   [[nodiscard]] VectorXd shown_with(const LawCandidate& law, const SessionModel& at,
                                     const VectorXd& free) const {
-    return shown(law, at, {free}).col(1);
+    return features_with(law, at, {free}).col(1);
   }
 
  private:
-  [[nodiscard]] Index nuisances() const { return set_.model.u.size(); }
+  [[nodiscard]] Index nuisances() const { return set_.model.nuisances.size(); }
   /// Whoever listens may end the search by what it throws.
   void report(const std::string& what = {}) const {
     if (progress_) progress_(what);
@@ -67,8 +67,8 @@ class LawSearch {
     return law.fit.evidence.log_evidence - without_.log_evidence;
   }
   /// Features of a model and of the same with curves of these values.
-  [[nodiscard]] MatrixXd shown(const LawCandidate& law, const SessionModel& at,
-                               const std::vector<VectorXd>& curves) const;
+  [[nodiscard]] MatrixXd features_with(const LawCandidate& law, const SessionModel& at,
+                                       const std::vector<VectorXd>& curves) const;
   void linearise(LawCandidate& law, const SessionModel& at, const VectorXd& values,
                  const MatrixXd& known) const;
   /// Ends early where the law falls behind one that gains this much.
@@ -90,8 +90,8 @@ std::vector<double> LawSearch::at_knots(const LawCandidate& law, const VectorXd&
   return values;
 }
 
-MatrixXd LawSearch::shown(const LawCandidate& law, const SessionModel& at,
-                          const std::vector<VectorXd>& curves) const {
+MatrixXd LawSearch::features_with(const LawCandidate& law, const SessionModel& at,
+                                  const std::vector<VectorXd>& curves) const {
   std::vector<std::shared_ptr<const Effect>> effects;
   std::vector<SessionModel> models{at};
   // About no leak, a small one need not be solved for.
@@ -105,13 +105,15 @@ MatrixXd LawSearch::shown(const LawCandidate& law, const SessionModel& at,
     models.back().terms.push_back({effects.back().get(), {}});
     models.back().values.push_back(1.0);
   }
-  if (law.law->port == Port::sensor) return problem_.shown(models, std::vector<bool>(models.size(), true));
+  if (law.law->port == Port::sensor)
+    return problem_.predicted_features(models, std::vector<bool>(models.size(), true));
   // Not all at once: a leak that is solved for takes long, and Ctrl-C is seen in between.
   constexpr size_t at_once = 2;
   MatrixXd all(problem_.features().count(), static_cast<Index>(models.size()));
   for (size_t first = 0; first < models.size(); first += at_once) {
     const std::span some = std::span(models).subspan(first, std::min(at_once, models.size() - first));
-    all.middleCols(static_cast<Index>(first), static_cast<Index>(some.size())) = problem_.shown(some);
+    all.middleCols(static_cast<Index>(first), static_cast<Index>(some.size())) =
+        problem_.predicted_features(some);
     report();
   }
   return all;
@@ -126,14 +128,14 @@ void LawSearch::linearise(LawCandidate& law, const SessionModel& at, const Vecto
   std::vector<VectorXd> curves{values};
   for (Index k = 0; k < values.size(); ++k)
     curves.push_back(values + small_part * law.scale * moves.col(k));
-  const MatrixXd all = shown(law, at, curves);
+  const MatrixXd all = features_with(law, at, curves);
   law.at = at;
   law.values = values;
   law.problem.known = known;
   law.problem.responses =
       (all.rightCols(values.size()).colwise() - all.col(1)) / (small_part * law.scale) * moves.inverse();
-  law.problem.target =
-      problem_.measured() - all.col(1) + law.problem.responses * values + known.rightCols(nuisances()) * at.u;
+  law.problem.target = problem_.measured() - all.col(1) + law.problem.responses * values +
+                       known.rightCols(nuisances()) * at.nuisances;
 }
 
 void LawSearch::refine(LawCandidate& law, double best_gain) const {
@@ -149,29 +151,32 @@ void LawSearch::refine(LawCandidate& law, double best_gain) const {
     };
     SessionModel at = law.at;
     VectorXd values = law.fit.values;
-    at.u = law.fit.evidence.u.tail(nuisances());
+    at.nuisances = law.fit.evidence.estimate.tail(nuisances());
     // Pressures are in proportion to the modulus, whose logarithm u[0] is.
     const double sd = problem_.nuisances().front().sd;
-    at.u[0] = law.at.u[0] + std::log(std::max(1.0 + sd * (at.u[0] - law.at.u[0]), least_modulus)) / sd;
-    const VectorXd linear = law.problem.target - law.problem.responses * values -
-                            law.problem.known.rightCols(nuisances()) * law.fit.evidence.u.tail(nuisances());
+    at.nuisances[0] =
+        law.at.nuisances[0] +
+        std::log(std::max(1.0 + sd * (at.nuisances[0] - law.at.nuisances[0]), least_modulus)) / sd;
+    const VectorXd linear =
+        law.problem.target - law.problem.responses * values -
+        law.problem.known.rightCols(nuisances()) * law.fit.evidence.estimate.tail(nuisances());
     const double before = cost(law.problem.target - law.problem.responses * law.values -
-                                   law.problem.known.rightCols(nuisances()) * law.at.u,
-                               law.at.u);
+                                   law.problem.known.rightCols(nuisances()) * law.at.nuisances,
+                               law.at.nuisances);
     VectorXd left;
     bool is_better = false;
     for (int halving = 0; halving < 4 && !is_better; ++halving) {
       if (halving > 0) {
-        at.u = 0.5 * (at.u + law.at.u);
+        at.nuisances = 0.5 * (at.nuisances + law.at.nuisances);
         values = 0.5 * (values + law.values);
       }
       left = problem_.measured() - shown_with(law, at, values);
-      is_better = left.allFinite() && cost(left, at.u) < before;
+      is_better = left.allFinite() && cost(left, at.nuisances) < before;
     }
     if (!is_better) return;
     if ((left - linear).cwiseAbs2().cwiseProduct(weight).mean() < straight) break;
     MatrixXd known = law.problem.known;
-    if ((at.u - law.at.u).norm() > far) {
+    if ((at.nuisances - law.at.nuisances).norm() > far) {
       SessionModel with = at;
       const auto effect = effect_of_text(tabulated_law(*law.law, law.knots, at_knots(law, values)));
       with.terms.push_back({effect.get(), {}});
@@ -208,8 +213,8 @@ void LawSearch::judge(LawCandidate& law, const std::vector<Fold>& folds) const {
 
 std::vector<LawCandidate> LawSearch::run(const std::vector<Fold>& folds) {
   base_.known = set_.columns;
-  base_.target = problem_.measured() - problem_.shown(std::span(&set_.model, 1)) +
-                 base_.known.rightCols(nuisances()) * set_.model.u;
+  base_.target = problem_.measured() - problem_.predicted_features(std::span(&set_.model, 1)) +
+                 base_.known.rightCols(nuisances()) * set_.model.nuisances;
   without_ = fit_with_shares(base_.target, base_.known, problem_.error(), set_.evidence.shares);
   std::vector<LawCandidate> laws;
   for (const PortLaw& law : port_laws()) {
@@ -252,10 +257,10 @@ bool predicts_better(const std::vector<double>& gains, size_t laws) {
 EffectSet set_with(const EffectSet& set, const LawCandidate& law) {
   EffectSet with = set;
   with.evidence = law.fit.evidence;
-  with.model.u = law.fit.evidence.u.tail(set.model.u.size());
+  with.model.nuisances = law.fit.evidence.estimate.tail(set.model.nuisances.size());
   with.columns.resize(law.problem.known.rows(), law.fit.root.cols() + law.problem.known.cols());
   with.columns << law.problem.responses * law.fit.root, law.problem.known;
-  with.known.columns = law.problem.known.rightCols(set.model.u.size());
+  with.known.columns = law.problem.known.rightCols(set.model.nuisances.size());
   with.covariance = inference::covariance_of_information(law.fit.evidence.precision).matrix;
   return with;
 }

@@ -14,7 +14,7 @@ double largest_tolerance(const rig::SessionProblem& problem, const rig::SessionM
 }
 
 double largest_tolerance(const rig::SessionProblem& problem, const EffectSet& set) {
-  return largest_tolerance(problem, set.model, set.model.u);
+  return largest_tolerance(problem, set.model, set.model.nuisances);
 }
 
 double fineness(const rig::SessionProblem& problem, const rig::SessionModel& model) {
@@ -30,7 +30,7 @@ double strain_by_chance(const rig::SessionProblem& problem, const rig::SessionMo
 }
 
 bool is_strained(const rig::SessionProblem& problem, const EffectSet& set) {
-  return strain_by_chance(problem, set.model, set.model.u) < surprising_by_chance;
+  return strain_by_chance(problem, set.model, set.model.nuisances) < surprising_by_chance;
 }
 
 }  // namespace diastole::explain

@@ -70,7 +70,8 @@ struct Fitted {
     const MatrixXd root = before.root();
     problem.set_tolerances(before.mean, root);
     rig::LinearisedModel start = rig::declared_rig(problem);
-    start.at.u.tail(tolerances.size()) = root.triangularView<Eigen::Lower>().solve(tolerances - before.mean);
+    start.at.nuisances.tail(tolerances.size()) =
+        root.triangularView<Eigen::Lower>().solve(tolerances - before.mean);
     start.columns = problem.nuisance_columns(start.at, start.there);
     const EffectSet linear = fit_set(problem, start.at, start, problem.error().prior.share);
     EffectSet exact = fit_set_exactly(problem, linear);
@@ -82,7 +83,7 @@ struct Fitted {
     const auto count = before.mean.size();
     const MatrixXd root = before.root();
     return {
-        before.mean + root * evidence.u.tail(count),
+        before.mean + root * evidence.estimate.tail(count),
         root *
             inference::covariance_of_information(evidence.precision).matrix.bottomRightCorner(count, count) *
             root.transpose()};

@@ -34,7 +34,7 @@ class SetProblem : public inference::LeastSquaresProblem {
   SetProblem(const rig::SessionProblem& problem, const SessionModel& start, rig::LinearisedModel known,
              Nuisances nuisances)
       : problem_(problem), start_(start), known_(std::move(known)), kind_(nuisances) {
-    const rig::RigModel base = problem.model({{}, {}, start.u, start.prior});
+    const rig::RigModel base = problem.model({{}, {}, start.nuisances, start.prior});
     size_t at = 0;
     for (const rig::ModelTerm& term : start.terms) {
       const std::vector<double> neutral = term.effect->neutral(base);
@@ -61,11 +61,11 @@ class SetProblem : public inference::LeastSquaresProblem {
         unknowns_.push_back(unknown);
         neutral_.emplace_back();
       }
-    const double u0 = start.u[0];
+    const double u0 = start.nuisances[0];
     unknowns_.push_back({{.name = "modulus", .lower = u0 - 3.0, .upper = u0 + 3.0}, 2e-3, false});
     neutral_.emplace_back();
     std::vector<inference::Parameter> all(unknowns_.begin(), unknowns_.end());
-    for (Index i = 1; i < start.u.size(); ++i)
+    for (Index i = 1; i < start.nuisances.size(); ++i)
       all.push_back(
           {.name = problem.nuisances()[static_cast<size_t>(i)].name, .lower = -bound_u, .upper = bound_u});
     space_ = ParameterSpace(std::move(all));
@@ -77,7 +77,7 @@ class SetProblem : public inference::LeastSquaresProblem {
     return inference::Linearisation::kept;
   }
   std::optional<VectorXd> residuals(const VectorXd& q) override {
-    const VectorXd seen = shown(q);
+    const VectorXd seen = features(q);
     if (!seen.allFinite()) return {};
     const VectorXd u = nuisances(q);
     VectorXd found(seen.size() + u.size());
@@ -87,9 +87,9 @@ class SetProblem : public inference::LeastSquaresProblem {
   }
   MatrixXd jacobian(const VectorXd& q) override {
     const MatrixXd columns = derivatives(q);
-    MatrixXd all = MatrixXd::Zero(columns.rows() + start_.u.size(), columns.cols());
+    MatrixXd all = MatrixXd::Zero(columns.rows() + start_.nuisances.size(), columns.cols());
     all.topRows(columns.rows()) = -(weight_.asDiagonal() * columns);
-    all.bottomRightCorner(start_.u.size(), start_.u.size()).setIdentity();
+    all.bottomRightCorner(start_.nuisances.size(), start_.nuisances.size()).setIdentity();
     return all;
   }
   /// Derivatives of what is shown, as a search had them at its end.
@@ -123,12 +123,12 @@ class SetProblem : public inference::LeastSquaresProblem {
     for (const rig::ModelTerm& term : start_.terms)
       for (const ChangePoint& moment : term.change_points)
         q[at++] = moment.time_s;
-    q[at++] = start_.u[0];
-    q.tail(start_.u.size() - 1) = start_.u.tail(start_.u.size() - 1);
+    q[at++] = start_.nuisances[0];
+    q.tail(start_.nuisances.size() - 1) = start_.nuisances.tail(start_.nuisances.size() - 1);
     return space_.clamped(q);
   }
   [[nodiscard]] VectorXd nuisances(const VectorXd& q) const {
-    VectorXd u(start_.u.size());
+    VectorXd u(start_.nuisances.size());
     u[0] = q[searched() - 1];
     u.tail(u.size() - 1) = q.tail(u.size() - 1);
     return u;
@@ -144,17 +144,18 @@ class SetProblem : public inference::LeastSquaresProblem {
         moment.session_s += q[at] - moment.time_s;
         moment.time_s = q[at++];
       }
-    made.u = nuisances(q);
+    made.nuisances = nuisances(q);
     return made;
   }
-  VectorXd shown(const VectorXd& q) {
+  VectorXd features(const VectorXd& q) {
     const VectorXd now = simulated(q);
     if (now.size() != at_.size() || now != at_) {
       at_ = now;
-      seen_ = problem_.shown(std::array{simulated_model(q)});
+      seen_ = problem_.predicted_features(std::array{simulated_model(q)});
     }
     if (kind_ == Nuisances::simulated) return seen_;
-    return seen_ + known_.columns.rightCols(others()) * (q.tail(others()) - known_.at.u.tail(others()));
+    return seen_ +
+           known_.columns.rightCols(others()) * (q.tail(others()) - known_.at.nuisances.tail(others()));
   }
   /// Of what is shown by q.
   const MatrixXd& derivatives(const VectorXd& q) {
@@ -200,7 +201,7 @@ class SetProblem : public inference::LeastSquaresProblem {
       before[static_cast<size_t>(i)] = static_cast<Index>(models.size());
       add(i, -step);
     }
-    const MatrixXd all = problem_.shown(models, same_plant);
+    const MatrixXd all = problem_.predicted_features(models, same_plant);
     seen_ = all.col(0);
     for (Index i = 0; i < count; ++i) {
       const Index other = before[static_cast<size_t>(i)];
@@ -216,11 +217,11 @@ class SetProblem : public inference::LeastSquaresProblem {
   }
   [[nodiscard]] SessionModel simulated_model(const VectorXd& q) const {
     SessionModel made = model(q);
-    if (kind_ == Nuisances::linear) made.u.tail(others()) = known_.at.u.tail(others());
+    if (kind_ == Nuisances::linear) made.nuisances.tail(others()) = known_.at.nuisances.tail(others());
     return made;
   }
   /// Nuisances but the modulus.
-  [[nodiscard]] Index others() const { return start_.u.size() - 1; }
+  [[nodiscard]] Index others() const { return start_.nuisances.size() - 1; }
 
   const SessionModel& start_;
   rig::LinearisedModel known_;
@@ -273,7 +274,7 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
   MatrixXd& columns = out.columns;
   const auto judged = [&](const rig::Shares& from) {
     columns = set.derivatives(q);
-    VectorXd z = problem.measured() - set.shown(q) + columns.rightCols(others + 1) * q.tail(others + 1);
+    VectorXd z = problem.measured() - set.features(q) + columns.rightCols(others + 1) * q.tail(others + 1);
     for (Index i = 0; i + 1 < searched; ++i)
       columns.col(i) *= prior_width(set, q, i);
     return fit_with_shares(z, columns, problem.error(), from);
@@ -308,8 +309,7 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
   if (!at_rest && inference::is_settled(out.termination))
     out.termination = inference::Termination::iteration_limit;
   out.model = set.model(q);
-  out.shown = set.shown(q);
-  out.known = {.at = out.model, .there = out.shown, .columns = known.columns};
+  out.known = {.at = out.model, .there = set.features(q), .columns = known.columns};
   out.known.columns.col(0) = columns.col(searched - 1);
   out.known.columns.rightCols(others) = columns.rightCols(others);
   out.unknowns.assign(set.unknowns().begin(), set.unknowns().begin() + set.effect_values());
@@ -321,7 +321,7 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
   }
   for (Index i = 0; i < set.effect_values(); ++i)
     out.errors.push_back(inference::standard_error(set.space()[i], q[i], std::sqrt(out.covariance(i, i))));
-  out.evidence.left = problem.measured() - out.shown;
+  out.evidence.left = problem.measured() - out.known.there;
   out.log_posterior = out.evidence.log_evidence + log_prior(problem, set, out.model);
   return out;
 }

@@ -104,7 +104,7 @@ Sizes sizes_of(const rig::SessionProblem& problem, const EffectSet& set, const E
     without.terms.erase(without.terms.begin() + static_cast<std::ptrdiff_t>(leave));
     models.push_back(std::move(without));
   }
-  const Eigen::MatrixXd shown = problem.shown(models);
+  const Eigen::MatrixXd shown = problem.predicted_features(models);
   sizes.changed = VectorXd::Zero(shown.rows());
   for (Index i = 1; i < shown.cols(); ++i) {
     const ChangeSize size = size_of_change(problem, set, shown.col(0) - shown.col(i));
@@ -186,13 +186,13 @@ double name_by_chance(const rig::SessionProblem& problem, const EffectSet& set, 
   const rig::EvidenceFit again = fit_with_shares(set.target(), set.columns, error, set.evidence.shares);
   const auto parts = static_cast<double>(parts_of(error));
   return std::min(parts * inference::normal_tail(std::ranges::max(again.surprise(error.prior))),
-                  strain_in_all_by_chance(problem, set, again.u.tail(set.model.u.size())));
+                  strain_in_all_by_chance(problem, set, again.estimate.tail(set.model.nuisances.size())));
 }
 
 /// ln of the odds of a set on waveforms that it was not fitted to alone: what it gains there has to overcome the effects' prior
 /// odds as all data do.
-double held_out_odds(double held_out_gain, size_t effects) {
-  return held_out_gain + static_cast<double>(effects) * std::log(effect_odds);
+double held_out_odds(double log_factor, size_t effects) {
+  return log_factor + static_cast<double>(effects) * std::log(effect_odds);
 }
 
 /// How often, by chance, where nothing is wrong, one part of the error is as large, one tolerance as far to either side, or both
@@ -201,7 +201,7 @@ double nothing_wrong_by_chance(const rig::SessionProblem& problem, const EffectS
   if (!inference::is_settled(set.termination)) return 0.0;
   const double misfit =
       inference::normal_tail(std::ranges::max(set.evidence.surprise(problem.error().prior)));
-  const double strain = strain_by_chance(problem, set.model, set.model.u);
+  const double strain = strain_by_chance(problem, set.model, set.model.nuisances);
   const double product = misfit * strain;
   const double together = product > 0.0 ? product * (1.0 - std::log(product)) : 0.0;
   return std::min({misfit, strain, together});
@@ -329,7 +329,7 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const WeighedSets& sea
   out.tone = material_tone(problem, best, error);
   const double irregular = irregularity_by_chance(problem, out.scatter);
   const bool settled = is_settled(out.searches);
-  if (is_more) out.held_out_gain = held_out_gain(problem, plain, best);
+  if (is_more) out.log_pseudo_bayes_factor = log_pseudo_bayes_factor(problem, plain, best);
   const bool is_irregular = irregular < irregular_by_chance;
   if (by_chance <= surprising_by_chance || is_irregular || !settled) {
     out.verdict = Verdict::unexplained;
@@ -344,7 +344,7 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const WeighedSets& sea
   }
   const double sure = std::log(name_probability / (1.0 - name_probability));
   const double odds =
-      is_more ? held_out_odds(*out.held_out_gain, best.model.terms.size() - search.given) : sure;
+      is_more ? held_out_odds(*out.log_pseudo_bayes_factor, best.model.terms.size() - search.given) : sure;
   const bool predicted = !is_more || odds > sure;
   const bool may_be_nothing_known =
       odds > -sure || nothing_wrong_by_chance(problem, plain) > surprising_by_chance;

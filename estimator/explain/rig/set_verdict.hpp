@@ -54,8 +54,8 @@ struct SetVerdict {
   bool is_tone_alone = false;          ///< nothing else is unexplained
   std::optional<rig::Tone> tone = {};  ///< if it is louder than the noise and material as an effect has to be
   std::vector<SearchEnd> searches;
-  /// Of the leading set, if it has more than the given effects: held_out_gain()'s.
-  std::optional<double> held_out_gain = {};
+  /// Of the leading set, if it has more than the given effects: log_pseudo_bayes_factor()'s.
+  std::optional<double> log_pseudo_bayes_factor = {};
 };
 
 /// A change of the features beside a set: modulus and offsets follow.

@@ -50,7 +50,7 @@ std::vector<SessionModel> models_with(const Pair& pair, const rig::RigModel& rig
         model.values.insert(model.values.end(), of->begin(), of->end());
       }
       models.push_back(model);
-      model.u[0] = 0.0;
+      model.nuisances[0] = 0.0;
       models.push_back(std::move(model));
     }
   return models;
@@ -69,14 +69,15 @@ std::vector<SessionModel> scan_synergies(const rig::SessionProblem& problem,
   const rig::RigModel rig = problem.model(declared.at);
   for (const Pair& pair : declared_pairs(problem, declared.at)) {
     std::vector<SessionModel> models = models_with(pair, rig, declared.at);
-    const Eigen::MatrixXd shown = problem.shown(models);
+    const Eigen::MatrixXd shown = problem.predicted_features(models);
     std::optional<std::pair<double, size_t>> found;
     for (size_t i = 0; i < models.size(); ++i) {
       const auto seen = shown.col(static_cast<Index>(i));
       if (!seen.allFinite()) continue;
-      const double evidence = fit_with_shares(problem.measured() - seen + declared.columns * models[i].u,
-                                              declared.columns, problem.error(), problem.error().prior.share)
-                                  .log_evidence;
+      const double evidence =
+          fit_with_shares(problem.measured() - seen + declared.columns * models[i].nuisances,
+                          declared.columns, problem.error(), problem.error().prior.share)
+              .log_evidence;
       if (!found || evidence > found->first) found = {evidence, i};
     }
     if (found) best.emplace_back(found->first, std::move(models[found->second]));

@@ -39,7 +39,7 @@ VectorXd value_errors(const rig::SessionProblem& problem, const EffectSet& set) 
   const double of_equations = 0.5 * right_to * fineness(problem, set.model);  // a sd: they are right to two
   const VectorXd factors = error_factors({set.target(), set.columns}, set.evidence.variance.cwiseInverse(),
                                          set.precision_by_data(), folds_of(problem));
-  const rig::RigModel base = problem.model({{}, {}, set.model.u, set.model.prior});
+  const rig::RigModel base = problem.model({{}, {}, set.model.nuisances, set.model.prior});
   VectorXd errors(static_cast<Index>(set.model.values.size()));
   Index at = 0;
   for (const rig::ModelTerm& term : set.model.terms) {

@@ -10,13 +10,14 @@ namespace {
 class ChangedParts : public testing::Test {
  protected:
   void SetUp() override {
-    start_.u = Eigen::VectorXd::LinSpaced(static_cast<Eigen::Index>(problem_.nuisances().size()), -1.0, 2.0);
+    start_.nuisances =
+        Eigen::VectorXd::LinSpaced(static_cast<Eigen::Index>(problem_.nuisances().size()), -1.0, 2.0);
     start_.terms = {{find_effect("hose-compliance"), {}}};
     start_.values = {80.0};
     known_.at = start_;
     known_.at.terms.clear();
     known_.at.values.clear();
-    known_.columns = Eigen::MatrixXd::Random(7, start_.u.size());
+    known_.columns = Eigen::MatrixXd::Random(7, start_.nuisances.size());
   }
   [[nodiscard]] Eigen::Index tolerances() const {
     return static_cast<Eigen::Index>(problem_.nuisances().size() - rig::basic_nuisances);
@@ -60,11 +61,11 @@ TEST_F(ChangedParts, StayWhereTheyWere) {
   EXPECT_TRUE(problem_.tolerances(free.known.at).isApprox(problem_.tolerances(known_.at), 1e-12));
   // The same change of the parts shows the same.
   rig::SessionModel moved = free.start;
-  moved.u.tail(tolerances()).setLinSpaced(0.2, -0.4);
+  moved.nuisances.tail(tolerances()).setLinSpaced(0.2, -0.4);
   const Eigen::VectorXd by = problem_.tolerances(moved) - problem_.tolerances(free.start);
   const Eigen::MatrixXd& before = problem_.prior(known_.at).root;
   const Eigen::VectorXd u_before = before.triangularView<Eigen::Lower>().solve(by);
-  const Eigen::VectorXd u_after = (moved.u - free.start.u).tail(tolerances());
+  const Eigen::VectorXd u_after = (moved.nuisances - free.start.nuisances).tail(tolerances());
   EXPECT_TRUE((free.known.columns.rightCols(tolerances()) * u_after)
                   .isApprox(known_.columns.rightCols(tolerances()) * u_before, 1e-9));
   EXPECT_EQ(free.known.columns.leftCols(rig::basic_nuisances), known_.columns.leftCols(rig::basic_nuisances));

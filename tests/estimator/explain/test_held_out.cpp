@@ -70,13 +70,14 @@ TEST_F(HeldOut, SmoothDiscrepanciesAreThoseThatExplainMost) {
 
 TEST_F(HeldOut, NothingIsGainedByWhatChangesNothing) {
   record(3);
-  EXPECT_NEAR(held_out_gain(*problem_, plain_, plain_), 0.0, 1e-6);
+  EXPECT_NEAR(log_pseudo_bayes_factor(*problem_, plain_, plain_), 0.0, 1e-6);
 }
 
 TEST_F(HeldOut, PartsFarOffAreSeldom) {
   record(3);
-  const auto parts = static_cast<double>(plain_.model.u.size()) - static_cast<double>(rig::basic_nuisances);
-  VectorXd u = VectorXd::Zero(plain_.model.u.size());
+  const auto parts =
+      static_cast<double>(plain_.model.nuisances.size()) - static_cast<double>(rig::basic_nuisances);
+  VectorXd u = VectorXd::Zero(plain_.model.nuisances.size());
   EXPECT_NEAR(strain_by_chance(*problem_, plain_.model, u), 1.0, 1e-12);
   u[u.size() - 1] = -5.0;
   const double beyond_five_sds = 5.733e-7;  // of a normal variable, to both sides

@@ -24,7 +24,7 @@ TEST(SetVerdict, NothingIsWrongOnlyByAModelThatTheDataDoNotExclude) {
   EffectSet strained = *plain;
   strained.model.terms.push_back({find_effect("sensor-gain"), {}});
   strained.model.values.push_back(1e-6);
-  strained.model.u.tail(1)[0] = 5.0;
+  strained.model.nuisances.tail(1)[0] = 5.0;
   WeighedSets made = search;
   made.sets = {strained, *plain};
   const auto verdict = [&](double without) {
@@ -74,12 +74,12 @@ TEST(SetVerdict, WhatTheDataSpeakForAndNewWaveformsDoNotBearMayBeNothing) {
   made.sets = {drifting, *plain};
   made.probability = {0.97, 0.03};
   const SetVerdict doubtful = judge_sets(problem, made, {});
-  ASSERT_TRUE(doubtful.held_out_gain);
-  EXPECT_NEAR(*doubtful.held_out_gain, 0.0, 1e-9);  // it changes nothing here
+  ASSERT_TRUE(doubtful.log_pseudo_bayes_factor);
+  EXPECT_NEAR(*doubtful.log_pseudo_bayes_factor, 0.0, 1e-9);  // it changes nothing here
   EXPECT_EQ(doubtful.verdict, Verdict::ambiguous);
   EXPECT_EQ(doubtful.ambiguous_with, std::vector<std::vector<std::string>>{{}});
   // Where a part would have to be far off without it, something is wrong for all that.
-  made.sets[1].model.u.tail(1)[0] = 5.0;
+  made.sets[1].model.nuisances.tail(1)[0] = 5.0;
   const SetVerdict refuted = judge_sets(problem, made, {});
   EXPECT_EQ(refuted.verdict, Verdict::unexplained);
   EXPECT_NEAR(refuted.confidence, 40.0 / 41.0, 1e-9)

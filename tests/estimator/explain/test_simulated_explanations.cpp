@@ -61,7 +61,7 @@ TEST_F(SimulatedSession, WithALeakIsExplainedByItAndPredictsWhatWasNotFitted) {
   EXPECT_GT(gap.before, 1.5);
   EXPECT_GT(gap.closed, 0.9);
   EXPECT_EQ(gap.held_out.size(), 3U);
-  EXPECT_GT(verdict_.held_out_gain.value(), 20.0);
+  EXPECT_GT(verdict_.log_pseudo_bayes_factor.value(), 20.0);
 }
 
 TEST_F(SimulatedSession, WithManySmallLossesOfStepsIsExplainedByThemAlone) {
@@ -88,7 +88,7 @@ TEST_F(SimulatedSession, OfOneWaveformWithAStiffeningWallGetsNoName) {
   EXPECT_GE(verdict_.confidence, 0.9);
   EXPECT_THAT(chosen().ids(), ElementsAre("strain-stiffening"));
   EXPECT_TRUE(is_settled(verdict_.searches));
-  EXPECT_NEAR(verdict_.held_out_gain.value() + std::log(effect_odds), 0.0, 1.0);
+  EXPECT_NEAR(verdict_.log_pseudo_bayes_factor.value() + std::log(effect_odds), 0.0, 1.0);
   EXPECT_EQ(verdict_.verdict, Verdict::ambiguous);
   EXPECT_THAT(verdict_.ambiguous_with, ElementsAre(testing::IsEmpty()));
 }

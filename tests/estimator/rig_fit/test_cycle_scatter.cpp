@@ -17,8 +17,8 @@ class Scatter : public testing::Test {
   std::vector<CycleScatter> of(const Session& session) const {
     const SessionProblem problem(session, family_, 2);
     SessionModel model;
-    model.u = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(problem.nuisances().size()));
-    model.u[0] = (std::log(8.0) - problem.nuisances()[0].mean) / problem.nuisances()[0].sd;
+    model.nuisances = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(problem.nuisances().size()));
+    model.nuisances[0] = (std::log(8.0) - problem.nuisances()[0].mean) / problem.nuisances()[0].sd;
     return cycle_scatter(problem, model);
   }
   SpecimenFamily family_ = gel_family();

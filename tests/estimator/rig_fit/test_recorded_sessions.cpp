@@ -27,7 +27,7 @@ TEST(RecordedSessions, WithNothingHiddenTheBaseModelErrsLessThanStated) {
     const Nuisance& modulus = problem.nuisances().front();  // its logarithm
     const double sd = modulus.sd * std::sqrt(fit.precision.inverse()(0, 0));
     EXPECT_LT(sd, 0.02) << name;
-    EXPECT_NEAR(modulus.mean + modulus.sd * fit.u[0], std::log(modulus_kPa), 3.0 * sd) << name;
+    EXPECT_NEAR(modulus.mean + modulus.sd * fit.estimate[0], std::log(modulus_kPa), 3.0 * sd) << name;
     // A third of what is stated, which is more than the least that any model is said to err.
     ASSERT_LT(SharePrior::least[0], 0.3 * problem.error().prior.share[0]);
     EXPECT_LT(fit.shares[0], 0.3 * problem.error().prior.share[0]) << name;

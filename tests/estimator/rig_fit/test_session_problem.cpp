@@ -139,10 +139,10 @@ std::array<double, signal_count> error_of_steps(const SessionProblem& problem, c
   for (size_t r = 0; r < problem.session().runs.size(); ++r) {
     const SessionRun& run = problem.session().runs[r];
     const PlantTrace plant = simulate_plant(model, run.drive, converged);
-    problem.features().project(r, std::array{Shown{observe(model, plant, run.drive.place, run.sample_s), {}}},
-                               truth);
+    problem.features().project(
+        r, std::array{RunPrediction{observe(model, plant, run.drive.place, run.sample_s), {}}}, truth);
   }
-  const VectorXd off = problem.shown(std::span(&of, 1)).col(0) - truth.col(0);
+  const VectorXd off = problem.predicted_features(std::span(&of, 1)).col(0) - truth.col(0);
   const VectorXd stated = problem.error().variance(problem.error().prior.share) - problem.error().noise;
   std::array<double, signal_count> squares{}, of_error{};
   for (const FeatureBlock& block : problem.features().blocks()) {
@@ -192,15 +192,15 @@ TEST(SessionProblem, ItsSlopesAreTheDifferencesOfShortSteps) {
   SessionModel at = declared_rig(problem).at;
   VectorXd there;
   const Eigen::MatrixXd slopes = problem.nuisance_slopes(at, there);
-  EXPECT_EQ(there, problem.shown(std::span(&at, 1)).col(0));
+  EXPECT_EQ(there, problem.predicted_features(std::span(&at, 1)).col(0));
   const Eigen::MatrixXd both_sides = problem.nuisance_slopes(at, there, true);
-  EXPECT_EQ(there, problem.shown(std::span(&at, 1)).col(0));
+  EXPECT_EQ(there, problem.predicted_features(std::span(&at, 1)).col(0));
   constexpr double step = 0.005;
   for (Index i = 0; i < slopes.cols(); ++i) {
     SessionModel before = at, after = at;
-    before.u[i] -= step;
-    after.u[i] += step;
-    const Eigen::MatrixXd shown = problem.shown(std::array{before, after});
+    before.nuisances[i] -= step;
+    after.nuisances[i] += step;
+    const Eigen::MatrixXd shown = problem.predicted_features(std::array{before, after});
     const VectorXd central = (shown.col(1) - shown.col(0)) / (2.0 * step);
     // An error of a twentieth costs a search a step; a drive that hardly yields is the most curved, with two per cent.
     EXPECT_LE((slopes.col(i) - central).norm(), 0.05 * central.norm() + 1e-4)
