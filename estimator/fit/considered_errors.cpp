@@ -6,6 +6,7 @@
 
 #include "estimator/fe/unloaded_shape.hpp"
 #include "estimator/fit/constrained_energy.hpp"
+#include "estimator/mesh/collapsed_edge.hpp"
 #include "estimator/mesh/nodal_lines.hpp"
 #include "estimator/mesh/node_field.hpp"
 #include "estimator/mesh/placed_mesh.hpp"
@@ -15,17 +16,6 @@ namespace diastole {
 namespace {
 
 using Eigen::Vector3d;
-
-/// The point itself, or one within its element where it lies on a collapsed edge, on which the wall has no direction.
-MaterialPoint beside_collapse(const HermiteMesh& mesh, MaterialPoint point) {
-  constexpr double least_relative_volume = 1e-6, beside = 0.02;
-  const Eigen::Matrix3d tangents = mesh.xi_gradient(mesh.reference(), point);
-  if (!(tangents.determinant() > least_relative_volume * std::pow(tangents.norm(), 3))) {
-    for (double& xi : point.xi)
-      xi = std::clamp(xi, beside, 1.0 - beside);
-  }
-  return point;
-}
 
 using Turn = std::function<Eigen::AngleAxisd(const MaterialAxes& wall, const MaterialAxes& axes, double depth,
                                              double angle)>;
@@ -63,7 +53,8 @@ NodeField along_normals(const HermiteMesh& mesh, const std::function<double(doub
       MaterialPoint at{e, {}};
       for (size_t k = 0; k < 3; ++k)
         at.xi[k] = static_cast<double>(c >> k & 1);
-      const MaterialPoint corner = beside_collapse(mesh, at);
+      constexpr double beside = 0.02;  // of a corner on a collapsed edge, where the wall has no direction
+      const MaterialPoint corner = beside_collapse(mesh, at, beside);
       const Vector3d here = value(corner);
       Eigen::Map<Vector3d>(&sum[dof_of(node, 0, 0)]) += here;
       for (size_t k = 0; k < 3; ++k) {

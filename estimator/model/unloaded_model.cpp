@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "estimator/io/study_refusal.hpp"
+#include "estimator/mesh/collapsed_edge.hpp"
 #include "estimator/model/affected_model.hpp"
 #include "estimator/model/study_model.hpp"
 #include "protocol/contract/angle.hpp"
@@ -27,15 +28,11 @@ Eigen::Vector3d angles_deg(const Eigen::Matrix3d& wall, const MaterialAxes& axes
 
 /// A corner, or a place beside it where the wall has no direction (a collapsed edge).
 MaterialPoint at_corner(const HermiteMesh& mesh, size_t element, size_t corner) {
-  constexpr double least_relative_volume = 1e-6, beside = 0.05;
   MaterialPoint point{element, {}};
   for (size_t k = 0; k < 3; ++k)
     point.xi[k] = static_cast<double>(corner >> k & 1);
-  const Eigen::Matrix3d tangents = mesh.xi_gradient(mesh.reference(), point);
-  if (tangents.determinant() > least_relative_volume * std::pow(tangents.norm(), 3)) return point;
-  for (double& xi : point.xi)
-    xi = xi == 0.0 ? beside : 1.0 - beside;
-  return point;
+  constexpr double beside = 0.05;
+  return beside_collapse(mesh, point, beside);
 }
 
 /// The angles of `axes` at the nodes: means over the elements that meet there, each next to the node's first.

@@ -4,20 +4,12 @@
 #include <cmath>
 #include <functional>
 
+#include "estimator/fe/body_volume.hpp"
 #include "estimator/fe/gauss_points.hpp"
 
 namespace diastole {
 
 namespace {
-
-double volume_mm3(const HermiteMesh& mesh, const NodeField& position_mm) {
-  const GaussTables& tables = gauss_tables();
-  double sum = 0.0;
-  for (size_t e = 0; e < mesh.element_count(); ++e)
-    for (size_t q = 0; q < gauss_points; ++q)
-      sum += tables.weight[q] * mesh.xi_gradient(position_mm, {e, tables.xi[q]}).determinant();
-  return std::abs(sum);
-}
 
 /// What smoothing makes of the volume of a motion, by smoothing it as if it were the frame's data (twicing: J. W. Tukey, Exploratory
 /// Data Analysis (1977) 526).

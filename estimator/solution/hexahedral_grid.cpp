@@ -9,6 +9,7 @@
 #include <unordered_map>
 
 #include "estimator/fe/point_fields.hpp"
+#include "estimator/mesh/collapsed_edge.hpp"
 
 namespace diastole {
 namespace {
@@ -81,15 +82,8 @@ GridCell cell_of(const std::array<size_t, 8>& eight) {
   return {CellShape::hexahedron, {eight.begin(), eight.end()}};
 }
 
-/// A place in an element, or one beside it where the wall has no direction.
-MaterialPoint with_direction(const HermiteMesh& mesh, MaterialPoint point) {
-  constexpr double least_relative_volume = 1e-6, beside = 0.01;
-  const Eigen::Matrix3d tangents = mesh.xi_gradient(mesh.reference(), point);
-  if (tangents.determinant() > least_relative_volume * std::pow(tangents.norm(), 3)) return point;
-  for (double& xi : point.xi)
-    xi = std::clamp(xi, beside, 1.0 - beside);
-  return point;
-}
+/// Of a sample where the wall has no direction.
+constexpr double beside = 0.01;
 
 Xi xi_of(size_t sample, const Sampling& n) {
   const std::array<size_t, 3> index{sample % (n[0] + 1), sample / (n[0] + 1) % (n[1] + 1),
@@ -133,7 +127,7 @@ GridStep step_of(const ElasticModel& model, const SolvedFrame& frame, const Hexa
       const Vector3d moved = mesh.value(frame.state.position_mm, point) - mesh.value(mesh.reference(), point);
       std::copy(moved.begin(), moved.end(), &displacement.values[3 * number]);
       const Eigen::VectorXd fields =
-          sampled_fields(point_fields(model.system(), frame.state, with_direction(mesh, point)));
+          sampled_fields(point_fields(model.system(), frame.state, beside_collapse(mesh, point, beside)));
       Eigen::Index column = 0;
       for (GridArray& array : arrays)
         for (size_t i = 0; i < array.components; ++i)

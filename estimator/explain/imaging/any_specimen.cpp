@@ -10,6 +10,7 @@
 #include "estimator/explain/imaging/imaged_specimen.hpp"
 #include "estimator/explain/imaging/linear_evidence.hpp"
 #include "estimator/explain/imaging/specimen_problem.hpp"
+#include "estimator/fe/body_volume.hpp"
 #include "estimator/inference/tail_probability.hpp"
 #include "estimator/io/study_refusal.hpp"
 
@@ -18,21 +19,13 @@ namespace {
 
 using Eigen::Index;
 
-double volume_mm3(const HermiteMesh& mesh) {
-  double sum = 0.0;
-  for (size_t e = 0; e < mesh.element_count(); ++e)
-    for (const ReferencePoint& point : make_reference_element(mesh, e))
-      sum += point.volume;
-  return sum;
-}
-
 class AnySpecimen final : public ImagedSpecimen {
  public:
   AnySpecimen(const Study& study, const FieldProgress& progress)
       : progress_(progress),
         problem_(study, [this](const std::string& text) { report(text); }),
         effects_(problem_.specimen().effects()),
-        volume_mm3_(volume_mm3(problem_.mesh())) {}
+        volume_mm3_(volume_mm3(problem_.mesh(), problem_.mesh().reference())) {}
 
   void fit_base() override { problem_.fit_base(); }
   void widen_sigmas(double factor) override { problem_.field().widen_sigmas(factor); }
