@@ -143,6 +143,39 @@ bool can_be_true(const Study& study) {
   return false;
 }
 
+/// Values that the recordings ask for and the study forbids.
+void remark_on_bounds(const Study& study, const explain::Explanation& found) {
+  for (const StudyParameter& stated : study.law.parameters) {
+    const auto seen = std::ranges::find(found.shifts, stated.name, &explain::ParameterShift::name);
+    if (seen != found.shifts.end() && (seen->after < stated.lower || seen->after > stated.upper))
+      fmt::print(stderr,
+                 "{}: {} is {:.4g} by these recordings, outside its bounds [{:g}, {:g}]. Check its unit, or "
+                 "widen them.\n",
+                 study.file.string(), stated.name, seen->after, stated.lower, stated.upper);
+  }
+}
+
+/// The files of an explanation, whose names it gets.
+void write_explanation(const Study& study, explain::Explanation& found, const fs::path& folder) {
+  std::error_code missing;
+  if (!found.effects.empty()) {
+    found.study_after = study_file;
+    write_whole_file(folder / study_file,
+                     fmt::format("{}: {}.\n", study_mark, explain::name_of(found.verdict)) +
+                         explain::explained_study(study, folder, found.effects, found.shifts));
+  } else {
+    fs::remove(folder / study_file, missing);  // of an earlier explanation
+  }
+  if (found.learned) {
+    found.learned->effect_file = learned_file;
+    explain::write_learned_file(folder / learned_file, found.learned->toml);
+  } else {
+    explain::remove_learned_file(folder / learned_file);
+  }
+  write_whole_file(folder / explanation_file, explain::to_json(found));
+  write_whole_file(folder / report_file, report::make_report(found));
+}
+
 ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out) {
   Study study = read_study(arguments.study);
   if (arguments.folder.empty()) {
@@ -180,30 +213,8 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
     std::cerr << "diastole explain: interrupted; nothing was written\n";
     return ExitCode::negative;
   }
-  for (const StudyParameter& stated : study.law.parameters) {
-    const auto seen = std::ranges::find(found.shifts, stated.name, &explain::ParameterShift::name);
-    if (seen != found.shifts.end() && (seen->after < stated.lower || seen->after > stated.upper))
-      fmt::print(stderr,
-                 "{}: {} is {:.4g} by these recordings, outside its bounds [{:g}, {:g}]. Check its unit, or "
-                 "widen them.\n",
-                 study.file.string(), stated.name, seen->after, stated.lower, stated.upper);
-  }
-  if (!found.effects.empty()) {
-    found.study_after = study_file;
-    write_whole_file(new_study,
-                     fmt::format("{}: {}.\n", study_mark, explain::name_of(found.verdict)) +
-                         explain::explained_study(study, arguments.folder, found.effects, found.shifts));
-  } else {
-    fs::remove(new_study, error);  // of an earlier explanation
-  }
-  if (found.learned) {
-    found.learned->effect_file = learned_file;
-    explain::write_learned_file(learned, found.learned->toml);
-  } else {
-    explain::remove_learned_file(learned);
-  }
-  write_whole_file(json_file, explain::to_json(found));
-  write_whole_file(page, report::make_report(found));
+  remark_on_bounds(study, found);
+  write_explanation(study, found, arguments.folder);
   if (out.json) {
     explain::Explanation brief = found;
     brief.traces.clear();

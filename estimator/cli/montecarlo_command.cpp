@@ -160,16 +160,7 @@ size_t workers_for(size_t wanted) {
   return wanted > 0 ? wanted : std::max(1U, std::thread::hardware_concurrency());
 }
 
-ExitCode run_montecarlo(const MonteCarloArguments& arguments, const CommandOutput& out) {
-  std::optional<MpiWorld> world;
-  if (in_mpi_world()) world.emplace();
-  const bool leads = !world || world->rank() == 0;
-  const Clock::time_point begun = Clock::now();
-  Study study = read_study(arguments.study);
-  if (leads && !arguments.study.unload) remark_on_imaged_load(study, "montecarlo");
-  use_images(study);
-  const Measurement measurement = read_measurement(study);
-  choose_truth(study, measurement, arguments);
+MonteCarloPlan plan_of(const MonteCarloArguments& arguments, const Measurement& measurement) {
   MonteCarloPlan plan{.noise_mm = arguments.noise_mm,
                       .frames = arguments.frames,
                       .repeats = arguments.repeats,
@@ -180,12 +171,25 @@ ExitCode run_montecarlo(const MonteCarloArguments& arguments, const CommandOutpu
   if (!arguments.grid_mm.empty())
     plan.grid = TagGrid{.stripe_mm = arguments.grid_mm[0], .pixel_mm = arguments.grid_mm[1]};
   if (plan.frames.empty()) plan.frames = {static_cast<int>(measurement.frames.size()) - 1};
-
   for (const double noise_mm : plan.noise_mm) {
     if (!std::isfinite(noise_mm))
       throw InputError(
           {"", "--noise", "is not a finite number", "Give standard deviations in mm, as 0.4,0.8."});
   }
+  return plan;
+}
+
+ExitCode run_montecarlo(const MonteCarloArguments& arguments, const CommandOutput& out) {
+  std::optional<MpiWorld> world;
+  if (in_mpi_world()) world.emplace();
+  const bool leads = !world || world->rank() == 0;
+  const Clock::time_point begun = Clock::now();
+  Study study = read_study(arguments.study);
+  if (leads && !arguments.study.unload) remark_on_imaged_load(study, "montecarlo");
+  use_images(study);
+  const Measurement measurement = read_measurement(study);
+  choose_truth(study, measurement, arguments);
+  const MonteCarloPlan plan = plan_of(arguments, measurement);
   CellFitter fitter(study, measurement, plan);
   const std::vector<Cell> cells = cells_of(plan);
   const size_t parameters = study.law.parameters.size();

@@ -439,21 +439,12 @@ FitOutcome fit_from_current_values(MotionModel& motion, EstimatedParameters& est
   return fit;
 }
 
-FitRecord fit_study(const Study& study, const Measurement& measurement, const StudyFitOptions& options) {
-  require_loaded_points(study, measurement);
-  ElasticModel model = make_affected_model(study);
-  require_cavity(study, model);
-  require_takes_work(study, model, options);
-  require_finer_mesh(study, options);
-  FitRecord record = head_of(study, measurement);
-  record.unknowns = model.dofs();
+namespace {
 
-  EstimatedParameters estimated = estimated_parameters(study, model);
-  if (options.start) take_start(estimated, *options.start, study.file.string());
-  const std::unique_ptr<ElasticMotion> body =
-      study_motion(study, std::move(model), estimated.groups, options.unload);
-  ElasticMotion& motion = *body;
-  motion.consider(considered_by(study, motion.model(), options));
+/// What the study and the command ask of the fit. `study`, `options`, `estimated`, `motion` and `record` outlive it.
+FitOptions fit_options_of(const Study& study, const StudyFitOptions& options,
+                          const EstimatedParameters& estimated, const ElasticMotion& motion,
+                          const FitRecord& record) {
   FitOptions fit_options;
   fit_options.file = study.file.string();
   fit_options.locator = locator_for(study.specimen);
@@ -473,8 +464,11 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
     if (options.on_iteration) options.on_iteration(record_of(step, estimated));
     if (options.on_checkpoint && step.accepted) options.on_checkpoint(checkpoint_of(record, step, estimated));
   };
-  const FitOutcome fit = fit_from_current_values(motion, estimated, measurement, fit_options, record.remarks);
+  return fit_options;
+}
 
+/// How the search went, whether or not it found anything.
+void record_search(FitRecord& record, const FitOutcome& fit, const EstimatedParameters& estimated) {
   record.converged = fit.converged();
   record.reason = fit.reason;
   record.iterations = fit.iterations;
@@ -482,6 +476,47 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   record.seconds = fit.seconds;
   for (const inference::SearchStep& step : fit.history)
     record.history.push_back(record_of(step, estimated));
+}
+
+void remark_on_mesh(FitRecord& record, const Study& study, const StudyFitOptions& options,
+                    const FitOutcome& fit, const ElasticModel& model) {
+  if (options.finer_mesh)
+    record.remarks.push_back(
+        fit.corrected
+            ? fmt::format(
+                  "Twice as many elements each way change the motion by {:.2g} standard deviations of its "
+                  "residuals (RMS): the values are those of that mesh.",
+                  *fit.corrected)
+            : "On a finer mesh there is no equilibrium at the estimate: the values are those of the study's "
+              "mesh.");
+  if (has_unseen_mesh_error(study, model, options))
+    record.remarks.emplace_back(
+        "So few elements bias a ventricle's values, and no error bar knows of it: --finer-mesh corrects "
+        "them.");
+}
+
+}  // namespace
+
+FitRecord fit_study(const Study& study, const Measurement& measurement, const StudyFitOptions& options) {
+  require_loaded_points(study, measurement);
+  ElasticModel model = make_affected_model(study);
+  require_cavity(study, model);
+  require_takes_work(study, model, options);
+  require_finer_mesh(study, options);
+  FitRecord record = head_of(study, measurement);
+  record.unknowns = model.dofs();
+
+  EstimatedParameters estimated = estimated_parameters(study, model);
+  if (options.start) take_start(estimated, *options.start, study.file.string());
+  const std::unique_ptr<ElasticMotion> body =
+      study_motion(study, std::move(model), estimated.groups, options.unload);
+  ElasticMotion& motion = *body;
+  motion.consider(considered_by(study, motion.model(), options));
+  const FitOutcome fit =
+      fit_from_current_values(motion, estimated, measurement,
+                              fit_options_of(study, options, estimated, motion, record), record.remarks);
+
+  record_search(record, fit, estimated);
   record_undeformed(record, measurement);
   if (measurement.repeated_rows > 0)
     record.excluded.push_back({"rows that repeat another to the last digit", measurement.repeated_rows});
@@ -495,19 +530,7 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   if (const auto& work = options.work)
     record.energy = FittedEnergy{work->frame, work->work_mJ, work->sigma_mJ, fit.stored_energy_mJ.value()};
   record.residuals = histogram_of(fit);
-  if (options.finer_mesh)
-    record.remarks.push_back(
-        fit.corrected
-            ? fmt::format(
-                  "Twice as many elements each way change the motion by {:.2g} standard deviations of its "
-                  "residuals (RMS): the values are those of that mesh.",
-                  *fit.corrected)
-            : "On a finer mesh there is no equilibrium at the estimate: the values are those of the study's "
-              "mesh.");
-  if (has_unseen_mesh_error(study, motion.model(), options))
-    record.remarks.emplace_back(
-        "So few elements bias a ventricle's values, and no error bar knows of it: --finer-mesh corrects "
-        "them.");
+  remark_on_mesh(record, study, options, fit, motion.model());
   for (std::string& remark : remarks_on(record, fit))
     record.remarks.push_back(std::move(remark));
   const EstimatedFrame& most_loaded = *std::ranges::max_element(

@@ -229,6 +229,26 @@ double robust_spread(std::vector<double> values) {
   return signal::deviation_of_normal(std::move(values));
 }
 
+namespace {
+
+/// Rows where the field has come to rest; which of them count is the last round's choice.
+std::vector<ObservationRow> rows_at_rest(FrameData& data, FrameField& field) {
+  using Source = std::tuple<bool, size_t, int>;
+  std::set<Source> rejected_sources;
+  for (const FieldRow& row : field.rows) {
+    if (row.rejected) rejected_sources.insert({row.of_tag, row.source, row.component});
+  }
+  std::vector<ObservationRow> rows = data.linearise(field);
+  for (size_t i = 0; i < rows.size(); ++i) {
+    FieldRow& row = field.rows[i];
+    row.rejected = rejected_sources.contains({row.of_tag, row.source, row.component});
+    rows[i].weight = row.rejected ? 0.0 : 1.0;
+  }
+  return rows;
+}
+
+}  // namespace
+
 FrameField reconstruct_frame(const FieldForms& forms, const Measurement& measurement, int frame,
                              const FrameOptions& options) {
   const FieldSpace& space = forms.space;
@@ -281,19 +301,7 @@ FrameField reconstruct_frame(const FieldForms& forms, const Measurement& measure
     move_to(field, space, q);
   }
   field.smoothing.lambda = lambda;
-  // Residuals where the field has come to rest; which rows count is the last round's choice.
-  using Source = std::tuple<bool, size_t, int>;
-  std::set<Source> rejected_sources;
-  for (const FieldRow& row : field.rows) {
-    if (row.rejected) rejected_sources.insert({row.of_tag, row.source, row.component});
-  }
-  std::vector<ObservationRow> rows = data.linearise(field);
-  for (size_t i = 0; i < rows.size(); ++i) {
-    FieldRow& row = field.rows[i];
-    row.rejected = rejected_sources.contains({row.of_tag, row.source, row.component});
-    rows[i].weight = row.rejected ? 0.0 : 1.0;
-  }
-  system.set_rows(rows);
+  system.set_rows(rows_at_rest(data, field));
   system.factorise(lambda);
   take_freedoms(field);
   field.scale = spread_of(field);

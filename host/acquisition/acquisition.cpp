@@ -289,27 +289,7 @@ class Acquisition {
               block.microsteps.assign(e.position_microsteps.begin(), e.position_microsteps.begin() + e.count);
               write(block);
             },
-            [&](const wire::RunEnded& e) {
-              outcome_.cycles = e.cycles;
-              triggers_raised_ = e.triggers;
-              const bool schedule_done =
-                  schedule_stops_ && wire::run_end_name(e.reason) == "stopped_at_cycle_end";
-              const std::string reason =
-                  schedule_done ? "completed" : std::string(wire::run_end_name(e.reason));
-              write(RunEndedRecord{reason, schedule_done, e.tick, e.cycles, e.triggers, e.r_waves});
-              if (e.triggers != outcome_.counts.triggers) {
-                remark("error", "triggers",
-                       fmt::format("the controller raised {} triggers, {} were reported", e.triggers,
-                                   outcome_.counts.triggers));
-              }
-              if (schedule_ && !schedule_stops_ && reason == "completed") {
-                remark("error", "schedule",
-                       fmt::format("the pump has made all its cycles, but slice {} of {} was not imaged: "
-                                   "waiting took more than wait_cycles_at_most",
-                                   schedule_->slice() + 1, schedule_->slices()));
-              }
-              end_after_tail(reason);
-            },
+            [&](const wire::RunEnded& e) { take(e); },
             [&](const wire::FaultRaised& e) {
               stopped_by_estop_ = stopped_by_estop_ || e.fault == wire::Fault::estop;
               remark("error", std::string(wire::fault_name(e.fault)),
@@ -324,6 +304,25 @@ class Acquisition {
             },
         },
         event);
+  }
+  void take(const wire::RunEnded& e) {
+    outcome_.cycles = e.cycles;
+    triggers_raised_ = e.triggers;
+    const bool schedule_done = schedule_stops_ && wire::run_end_name(e.reason) == "stopped_at_cycle_end";
+    const std::string reason = schedule_done ? "completed" : std::string(wire::run_end_name(e.reason));
+    write(RunEndedRecord{reason, schedule_done, e.tick, e.cycles, e.triggers, e.r_waves});
+    if (e.triggers != outcome_.counts.triggers) {
+      remark("error", "triggers",
+             fmt::format("the controller raised {} triggers, {} were reported", e.triggers,
+                         outcome_.counts.triggers));
+    }
+    if (schedule_ && !schedule_stops_ && reason == "completed") {
+      remark("error", "schedule",
+             fmt::format("the pump has made all its cycles, but slice {} of {} was not imaged: "
+                         "waiting took more than wait_cycles_at_most",
+                         schedule_->slice() + 1, schedule_->slices()));
+    }
+    end_after_tail(reason);
   }
   /// Our own stop that crossed the end of the motion found what it wanted.
   void take(const wire::Nak& refusal) {

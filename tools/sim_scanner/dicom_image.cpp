@@ -54,6 +54,38 @@ const char* manufacturer_of(const ImageLabel& label) {
   return "";
 }
 
+/// Pixels as they are stored, row after row; `unit`: what one is in the picture's.
+std::vector<Uint16> stored(const Picture& picture, const Storage& storage, double unit) {
+  std::vector<Uint16> pixels;
+  for (Eigen::Index row = 0; row < picture.rows(); ++row) {
+    for (Eigen::Index column = 0; column < picture.cols(); ++column)
+      pixels.push_back(static_cast<Uint16>(std::lround(
+          std::clamp((static_cast<double>(picture(row, column)) * unit - storage.intercept) / storage.slope,
+                     storage.least, storage.most))));
+  }
+  return pixels;
+}
+
+/// How the scanner's maker says what the pixels are.
+void put_kind(DcmDataset& data, const ImageLabel& label, const Storage& storage) {
+  const auto put = [&](const DcmTagKey& tag, const std::string& value) {
+    data.putAndInsertString(tag, value.c_str());
+  };
+  put(DCM_Manufacturer, manufacturer_of(label));
+  // One maker leaves it to the pixels to show which image is which.
+  const bool is_unstated = label.velocity && label.velocity->maker == Maker::ge;
+  put(DCM_ImageType, is_unstated             ? "ORIGINAL\\PRIMARY\\OTHER"
+                     : storage.units.empty() ? "ORIGINAL\\PRIMARY\\M"
+                                             : "ORIGINAL\\PRIMARY\\P");
+  if (label.velocity && label.velocity->says_venc && label.velocity->maker == Maker::siemens)
+    put(DCM_SequenceName, fmt::format("*fl2d1_v{:.0f}in", label.velocity->venc_cm_s));
+  if (!storage.units.empty()) {
+    put(DCM_RescaleIntercept, fmt::format("{:.8g}", storage.intercept));
+    put(DCM_RescaleSlope, fmt::format("{:.10g}", storage.slope));
+    put(DCM_RescaleType, storage.units);
+  }
+}
+
 }  // namespace
 
 void write_dicom(const std::filesystem::path& path, const Picture& picture, const ImageLabel& label) {
@@ -71,19 +103,7 @@ void write_dicom(const std::filesystem::path& path, const Picture& picture, cons
   put(DCM_SeriesInstanceUID, label.series_uid);
   put(DCM_Modality, "MR");
   const Storage storage = storage_of(label);
-  put(DCM_Manufacturer, manufacturer_of(label));
-  // One maker leaves it to the pixels to show which image is which.
-  const bool is_unstated = label.velocity && label.velocity->maker == Maker::ge;
-  put(DCM_ImageType, is_unstated             ? "ORIGINAL\\PRIMARY\\OTHER"
-                     : storage.units.empty() ? "ORIGINAL\\PRIMARY\\M"
-                                             : "ORIGINAL\\PRIMARY\\P");
-  if (label.velocity && label.velocity->says_venc && label.velocity->maker == Maker::siemens)
-    put(DCM_SequenceName, fmt::format("*fl2d1_v{:.0f}in", label.velocity->venc_cm_s));
-  if (!storage.units.empty()) {
-    put(DCM_RescaleIntercept, fmt::format("{:.8g}", storage.intercept));
-    put(DCM_RescaleSlope, fmt::format("{:.10g}", storage.slope));
-    put(DCM_RescaleType, storage.units);
-  }
+  put_kind(data, label, storage);
   put(DCM_ScanningSequence, "GR");
   put(DCM_PatientName, "");
   put(DCM_PatientID, "");
@@ -113,14 +133,7 @@ void write_dicom(const std::filesystem::path& path, const Picture& picture, cons
       {DCM_PixelRepresentation, storage.is_signed ? 1 : 0}};
   for (const auto& [tag, value] : numbers)
     data.putAndInsertUint16(tag, static_cast<Uint16>(value));
-  std::vector<Uint16> pixels;
-  for (Eigen::Index row = 0; row < picture.rows(); ++row) {
-    for (Eigen::Index column = 0; column < picture.cols(); ++column)
-      pixels.push_back(static_cast<Uint16>(std::lround(
-          std::clamp((static_cast<double>(picture(row, column)) * half_turn_of(label) - storage.intercept) /
-                         storage.slope,
-                     storage.least, storage.most))));
-  }
+  const std::vector<Uint16> pixels = stored(picture, storage, half_turn_of(label));
   data.putAndInsertUint16Array(DCM_PixelData, pixels.data(), pixels.size());
   const OFCondition saved = file.saveFile(path.c_str(), EXS_LittleEndianExplicit);
   if (saved.bad())

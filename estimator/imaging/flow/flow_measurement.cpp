@@ -262,6 +262,84 @@ void join_cycle(FlowMeasurement& flow, const FlowRequest& request) {
   flow.stroke_mL = flow.volume_at(highest_s);
 }
 
+void add_other_lumens(FlowMeasurement& flow, const std::vector<MovingRegion>& regions,
+                      const MovingRegion& chosen) {
+  for (const MovingRegion& other : regions) {
+    if (&other == &chosen || other.radius_px < 0.5 * chosen.radius_px) continue;
+    flow.findings.push_back(
+        {Severity::warning, "other-lumen",
+         fmt::format("fluid moves also around column {:.0f}, row {:.0f}", other.centre.x(), other.centre.y()),
+         flow.scan.name, other.radius_px, "px",
+         "If that is the tube, give --centre with this column and row."});
+  }
+}
+
+void find_background(FlowMeasurement& flow, const FlowRequest& request, const MotionMap& map,
+                     const Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic>& still,
+                     const MovingRegion& region) {
+  flow.background.order = -1;
+  if (request.remove_background)
+    flow.background = background_phase(map, still, region.centre, region.radius_px);
+  if (flow.background.order >= 0) return;
+  flow.findings.push_back(
+      {Severity::warning, "background-unknown",
+       request.remove_background
+           ? "there is no still material around the lumen: the background phase is not known"
+           : "the background phase was left, as asked for",
+       flow.scan.name, static_cast<double>(flow.background.pixels), "pixels",
+       "A block of still gel around the tube shows the background; --close takes off what a cycle "
+       "does not return."});
+}
+
+/// An error of the background is the same in all phases.
+void add_background_error(FlowMeasurement& flow) {
+  const double background_cm_s = flow.background.order < 0
+                                     ? usual_background_cm_s
+                                     : flow.background.sigma_rad * flow.scan.cm_s_per_radian();
+  const double background_mL_s = background_cm_s * 0.01 * flow.lumen.area_mm2;
+  flow.lumen.covariance.array() += background_mL_s * background_mL_s;
+}
+
+/// The lumen's pixels away from its wall.
+std::vector<Eigen::Vector2i> core_of(const MovingRegion& region) {
+  std::vector<Eigen::Vector2i> core;
+  for (const Eigen::Vector2i& at : region.pixels)
+    if ((at.cast<double>() - region.centre).norm() < std::max(1.5, 0.6 * region.radius_px))
+      core.push_back(at);
+  return core;
+}
+
+/// Of each image, that of the pixels' sum.
+std::vector<double> mean_phases_rad(const PhaseContrast& scan, const std::vector<Eigen::Vector2i>& pixels) {
+  std::vector<double> phases;
+  for (size_t k = 0; k < scan.phases(); ++k) {
+    std::complex<double> sum = 0;
+    for (const Eigen::Vector2i& at : pixels)
+      sum += std::polar(static_cast<double>(scan.magnitude[k](at.y(), at.x())),
+                        static_cast<double>(scan.phase_rad[k](at.y(), at.x())));
+    phases.push_back(std::arg(sum));
+  }
+  return phases;
+}
+
+/// Flow and volume of each image; `core_phase_rad`: as measured in the core.
+void add_phases(FlowMeasurement& flow, const FlowRequest& request,
+                const std::vector<double>& core_phase_rad) {
+  for (size_t k = 0; k < flow.scan.phases(); ++k) {
+    PhaseFlow phase;
+    phase.phase_s = flow.scan.time_s[k];
+    const auto at = static_cast<Eigen::Index>(k);
+    phase.flow_mL_s = {flow.lumen.flow_mL_s[at], std::sqrt(flow.lumen.covariance(at, at))};
+    if (request.close) phase.flow_mL_s = flow.flow_at(phase.phase_s);
+    phase.volume_mL = flow.volume_at(phase.phase_s);
+    phase.core_cm_s = flow.lumen.core_cm_s[k];
+    phase.turns = static_cast<int>(std::lround(
+        (phase.core_cm_s / flow.scan.cm_s_per_radian() - core_phase_rad[k]) / (2 * std::numbers::pi)));
+    flow.unwrapped += phase.turns != 0 ? 1U : 0U;
+    flow.phases.push_back(phase);
+  }
+}
+
 }  // namespace
 
 ValueWithError FlowMeasurement::flow_at(double time_s) const {
@@ -282,29 +360,9 @@ FlowMeasurement measure_flow(PhaseContrast scan, const FlowRequest& request, con
   const MotionMap map = motion_map(flow.scan);
   const std::vector<MovingRegion> regions = moving_regions(map);
   const MovingRegion& region = chosen_region(regions, request, folder, flow.scan.name);
-  for (const MovingRegion& other : regions) {
-    if (&other == &region || other.radius_px < 0.5 * region.radius_px) continue;
-    flow.findings.push_back(
-        {Severity::warning, "other-lumen",
-         fmt::format("fluid moves also around column {:.0f}, row {:.0f}", other.centre.x(), other.centre.y()),
-         flow.scan.name, other.radius_px, "px",
-         "If that is the tube, give --centre with this column and row."});
-  }
-
+  add_other_lumens(flow, regions, region);
   const auto still = still_pixels(map, regions, clear_px);
-  flow.background.order = -1;
-  if (request.remove_background)
-    flow.background = background_phase(map, still, region.centre, region.radius_px);
-  if (flow.background.order < 0)
-    flow.findings.push_back(
-        {Severity::warning, "background-unknown",
-         request.remove_background
-             ? "there is no still material around the lumen: the background phase is not known"
-             : "the background phase was left, as asked for",
-         flow.scan.name, static_cast<double>(flow.background.pixels), "pixels",
-         "A block of still gel around the tube shows the background; --close takes off what a cycle "
-         "does not return."});
-
+  find_background(flow, request, map, still, region);
   LumenData data{plane,
                  flow.scan.magnitude,
                  without_background(flow.scan, flow.background),
@@ -315,18 +373,8 @@ FlowMeasurement measure_flow(PhaseContrast scan, const FlowRequest& request, con
   const std::vector<Eigen::Vector2d> movement_px =
       lumen_movement_px(data.magnitude, region, map.noise.magnitude);
   const HeldLumen held = held_lumen(flow.scan, data, map, region, movement_px);
-  std::vector<Eigen::Vector2i> core;
-  for (const Eigen::Vector2i& at : held.region.pixels)
-    if ((at.cast<double>() - held.region.centre).norm() < std::max(1.5, 0.6 * held.region.radius_px))
-      core.push_back(at);
-  std::vector<double> core_phase;
-  for (size_t k = 0; k < flow.scan.phases(); ++k) {
-    std::complex<double> sum = 0;
-    for (const Eigen::Vector2i& at : core)
-      sum += std::polar(static_cast<double>(held.scan.magnitude[k](at.y(), at.x())),
-                        static_cast<double>(held.scan.phase_rad[k](at.y(), at.x())));
-    core_phase.push_back(std::arg(sum));
-  }
+  const std::vector<Eigen::Vector2i> core = core_of(held.region);
+  const std::vector<double> core_phase = mean_phases_rad(held.scan, core);
   const UnwrappedCycle cycle = unwrapped(core_phase, gaps_of(flow.scan));
   LumenStart start{first_scene(plane, held.map, held.region, held.scan.magnitude, cycle.phase_rad, core),
                    {},
@@ -337,26 +385,9 @@ FlowMeasurement measure_flow(PhaseContrast scan, const FlowRequest& request, con
   require_known_turns(flow, folder);
   require_trustworthy(flow, folder);
 
-  // An error of the background is the same in all phases.
-  const double background_cm_s = flow.background.order < 0
-                                     ? usual_background_cm_s
-                                     : flow.background.sigma_rad * flow.scan.cm_s_per_radian();
-  const double background_mL_s = background_cm_s * 0.01 * flow.lumen.area_mm2;
-  flow.lumen.covariance.array() += background_mL_s * background_mL_s;
+  add_background_error(flow);
   join_cycle(flow, request);
-  for (size_t k = 0; k < flow.scan.phases(); ++k) {
-    PhaseFlow phase;
-    phase.phase_s = flow.scan.time_s[k];
-    const auto at = static_cast<Eigen::Index>(k);
-    phase.flow_mL_s = {flow.lumen.flow_mL_s[at], std::sqrt(flow.lumen.covariance(at, at))};
-    if (request.close) phase.flow_mL_s = flow.flow_at(phase.phase_s);
-    phase.volume_mL = flow.volume_at(phase.phase_s);
-    phase.core_cm_s = flow.lumen.core_cm_s[k];
-    phase.turns = static_cast<int>(std::lround(
-        (phase.core_cm_s / flow.scan.cm_s_per_radian() - core_phase[k]) / (2 * std::numbers::pi)));
-    flow.unwrapped += phase.turns != 0 ? 1U : 0U;
-    flow.phases.push_back(phase);
-  }
+  add_phases(flow, request, core_phase);
   add_fit_findings(flow);
   return flow;
 }

@@ -390,56 +390,28 @@ void add_wild_points(VentricleFit& fit, const GuidePoints& guide, const WallFit&
   }
 }
 
-}  // namespace
+struct FreeSlices {
+  std::vector<FreeSlice> slices;
+  std::vector<size_t> place;  ///< of each slice among them, if it is one
+};
 
-VentricleFit fit_ventricle(const GuidePoints& given, const VentricleOptions& options) {
-  VentricleFit fit;
-  fit.findings = given.findings;
-  const GuidePoints sound = without_wild_points(given, fit.findings);
-  const std::vector<GuideSlice> slices = guide_slices(sound);
-  const VentricleFrame start = ventricle_frame(sound, slices);
-  const Vector3d axis = start.frame.axes.col(2);
-  fit.frame = start.frame;
-  const GuidePoints guide = with_base(sound, slices, start.frame, fit.findings);
-  const std::vector<bool> held = held_slices(guide, slices, options, axis);
-
-  std::vector<FreeSlice> free;
-  std::vector<size_t> place(slices.size(), 0);
+FreeSlices free_slices(const std::vector<GuideSlice>& slices, const std::vector<bool>& held,
+                       const Eigen::Matrix3d& axes) {
+  FreeSlices free{{}, std::vector<size_t>(slices.size(), 0)};
   for (size_t s = 0; s < slices.size(); ++s) {
     if (held[s]) continue;
-    const Vector3d normal = fit.frame.axes.transpose() * slices[s].normal;
+    const Vector3d normal = axes.transpose() * slices[s].normal;
     FreeSlice one{s, {}};
     one.directions.col(0) = normal.unitOrthogonal();
     one.directions.col(1) = normal.cross(one.directions.col(0));
-    place[s] = free.size();
-    free.push_back(one);
+    free.place[s] = free.slices.size();
+    free.slices.push_back(one);
   }
-  if (!free.empty() && !has_reference(slices, held, axis))
-    fit.findings.push_back(
-        {Severity::warning, "no-reference",
-         "no two long-axis slices show where the short-axis slices belong: their mean displacement is taken "
-         "as none",
-         guide.file, 0, "",
-         "Set points in long-axis images too, or name slices that are right: --reference."});
+  return free;
+}
 
-  WallFit walls(guide, slices, start, free);
-  constexpr int limit = 100;
-  fit.converged = walls.run(limit);
-  fit.iterations = walls.iterations();
-  fit.noise_factor = walls.noise_factor();
-  fit.shift_spread_mm = walls.shift_spread_mm();
-  for (size_t s = 0; s < slices.size(); ++s) {
-    SliceShift shift{guide.slices[s], held[s]};
-    if (options.estimate_shifts && slices[s].points == 0) {
-      shift = {.slice = guide.slices[s], .sigma_mm = walls.shift_spread_mm()};  // nothing is seen of it
-    } else if (!held[s]) {
-      shift.shift_mm = walls.shift_mm(place[s]);
-      shift.sigma_mm = walls.shift_sigma_mm(place[s]);
-    }
-    fit.shifts.push_back(shift);
-  }
-  add_wild_points(fit, guide, walls);
-
+/// Each phase's walls, and how far its points lie beside them.
+void add_phases(VentricleFit& fit, const GuidePoints& guide, const WallFit& walls) {
   std::vector<double> squares(guide.phases.size(), 0);
   std::vector<size_t> counts(guide.phases.size(), 0);
   for (const GuidePoint& point : guide.points) {
@@ -463,6 +435,48 @@ VentricleFit fit_ventricle(const GuidePoints& given, const VentricleOptions& opt
     fit.phases.push_back(std::move(one));
   }
   fit.rms_mm = std::sqrt(all_squares / static_cast<double>(all_points));
+}
+
+}  // namespace
+
+VentricleFit fit_ventricle(const GuidePoints& given, const VentricleOptions& options) {
+  VentricleFit fit;
+  fit.findings = given.findings;
+  const GuidePoints sound = without_wild_points(given, fit.findings);
+  const std::vector<GuideSlice> slices = guide_slices(sound);
+  const VentricleFrame start = ventricle_frame(sound, slices);
+  const Vector3d axis = start.frame.axes.col(2);
+  fit.frame = start.frame;
+  const GuidePoints guide = with_base(sound, slices, start.frame, fit.findings);
+  const std::vector<bool> held = held_slices(guide, slices, options, axis);
+
+  const FreeSlices free = free_slices(slices, held, fit.frame.axes);
+  if (!free.slices.empty() && !has_reference(slices, held, axis))
+    fit.findings.push_back(
+        {Severity::warning, "no-reference",
+         "no two long-axis slices show where the short-axis slices belong: their mean displacement is taken "
+         "as none",
+         guide.file, 0, "",
+         "Set points in long-axis images too, or name slices that are right: --reference."});
+
+  WallFit walls(guide, slices, start, free.slices);
+  constexpr int limit = 100;
+  fit.converged = walls.run(limit);
+  fit.iterations = walls.iterations();
+  fit.noise_factor = walls.noise_factor();
+  fit.shift_spread_mm = walls.shift_spread_mm();
+  for (size_t s = 0; s < slices.size(); ++s) {
+    SliceShift shift{guide.slices[s], held[s]};
+    if (options.estimate_shifts && slices[s].points == 0) {
+      shift = {.slice = guide.slices[s], .sigma_mm = walls.shift_spread_mm()};  // nothing is seen of it
+    } else if (!held[s]) {
+      shift.shift_mm = walls.shift_mm(free.place[s]);
+      shift.sigma_mm = walls.shift_sigma_mm(free.place[s]);
+    }
+    fit.shifts.push_back(shift);
+  }
+  add_wild_points(fit, guide, walls);
+  add_phases(fit, guide, walls);
   for (Finding& finding : ventricle_findings(fit, guide, slices, options))
     fit.findings.push_back(std::move(finding));
   return fit;

@@ -279,6 +279,33 @@ std::string pose_text(const Study& study, const scanner::ScanPose& pose) {
       row(pose.axes.col(0)), row(pose.axes.col(1)), row(pose.axes.col(2)));
 }
 
+void report_series(const ScanArguments& arguments, const std::vector<scanner::ScannedSeries>& series,
+                   const CommandOutput& out) {
+  size_t files = 0;
+  for (const scanner::ScannedSeries& one : series)
+    files += one.files;
+  if (out.json) {
+    nlohmann::ordered_json json{
+        {"folder", arguments.folder.string()}, {"files", files}, {"seed", arguments.protocol.seed}};
+    json["series"] = nlohmann::ordered_json::array();
+    for (const scanner::ScannedSeries& one : series)
+      json["series"].push_back({{"number", one.number},
+                                {"kind", one.kind},
+                                {"view", one.view},
+                                {"tag_angles_deg", one.angles_deg},
+                                {"files", one.files}});
+    std::cout << json_text(json, 1) << '\n';
+    return;
+  }
+  for (const scanner::ScannedSeries& one : series)
+    fmt::print(
+        "Series {}: {}, {}{}, {} files\n", one.number, one.kind, one.view,
+        one.angles_deg.empty() ? "" : fmt::format(", tags {:g} degrees", fmt::join(one.angles_deg, " and ")),
+        one.files);
+  fmt::print("\n{} files are in {}. What they tell:\n  diastole fit {}\n", files,
+             (arguments.folder / "dicom").string(), (arguments.folder / "scan.study.toml").string());
+}
+
 ExitCode scan_study(const ScanArguments& arguments, const CommandOutput& out) {
   const Study study = read_study(arguments.study);
   remark_on_imaged_load(study, "scan");
@@ -328,29 +355,7 @@ ExitCode scan_study(const ScanArguments& arguments, const CommandOutput& out) {
   write_whole_file(partial / "scan.study.toml", study_text(study));
   if (Interruption::requested()) throw ScanInterrupted{};
   unfinished.finish();
-  size_t files = 0;
-  for (const scanner::ScannedSeries& one : series)
-    files += one.files;
-  if (out.json) {
-    nlohmann::ordered_json json{
-        {"folder", arguments.folder.string()}, {"files", files}, {"seed", arguments.protocol.seed}};
-    json["series"] = nlohmann::ordered_json::array();
-    for (const scanner::ScannedSeries& one : series)
-      json["series"].push_back({{"number", one.number},
-                                {"kind", one.kind},
-                                {"view", one.view},
-                                {"tag_angles_deg", one.angles_deg},
-                                {"files", one.files}});
-    std::cout << json_text(json, 1) << '\n';
-    return ExitCode::done;
-  }
-  for (const scanner::ScannedSeries& one : series)
-    fmt::print(
-        "Series {}: {}, {}{}, {} files\n", one.number, one.kind, one.view,
-        one.angles_deg.empty() ? "" : fmt::format(", tags {:g} degrees", fmt::join(one.angles_deg, " and ")),
-        one.files);
-  fmt::print("\n{} files are in {}. What they tell:\n  diastole fit {}\n", files,
-             (arguments.folder / "dicom").string(), (arguments.folder / "scan.study.toml").string());
+  report_series(arguments, series, out);
   return ExitCode::done;
 }
 
@@ -362,6 +367,52 @@ ExitCode run_scan(const ScanArguments& arguments, const CommandOutput& out) {
     std::cerr << "diastole scan: interrupted; nothing was written\n";
     return ExitCode::negative;
   }
+}
+
+void add_protocol(CLI::App& command, scanner::ScanProtocol& protocol) {
+  command.add_option("--short-axis", protocol.short_axis_mm, "heights of slices across the axis, mm")
+      ->delimiter(',')
+      ->expected(0, 64);
+  command
+      .add_option("--long-axis", protocol.long_axis_deg,
+                  "slices along the axis, turned so many degrees from x")
+      ->delimiter(',')
+      ->expected(0, 64);
+  command.add_option("--fov", protocol.field_of_view_mm, "field of view, mm")
+      ->check(positive_number)
+      ->capture_default_str();
+  command.add_option("--matrix", protocol.matrix, "pixels each way")
+      ->check(CLI::Range(32, 512))
+      ->capture_default_str();
+  command.add_option("--acquired", protocol.acquired, "share of the phase-encoding lines that is measured")
+      ->check(CLI::Range(0.3, 1.0))
+      ->capture_default_str();
+  command.add_option("--thickness", protocol.thickness_mm, "of a slice, mm")
+      ->check(positive_number)
+      ->capture_default_str();
+  command.add_option("--tag-spacing", protocol.tags.spacing_mm, "mm")
+      ->check(positive_number)
+      ->capture_default_str();
+  command.add_option("--tag-angles", protocol.tags.angles_deg, "of the tags' normals from the rows, degrees")
+      ->delimiter(',')
+      ->expected(1, 8);
+  command
+      .add_option("--tag-pulses", protocol.tags.weights,
+                  "flip angles in proportion: 1,1 or binomial, as 1,3,3,1")
+      ->delimiter(',')
+      ->expected(2, 8)
+      ->check(positive_number);
+  command.add_flag("--grid", protocol.tags.grid, "all directions in one image");
+  command.add_option("--snr", protocol.snr, "signal of tissue over the noise of one channel")
+      ->check(positive_number)
+      ->capture_default_str();
+  command.add_option("--T1", protocol.T1_s, "of tissue, s")->check(positive_number)->capture_default_str();
+  command.add_option("--shading", protocol.shading, "of the coils, from corner to corner")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command.add_flag("--cine", protocol.cine, "series without tags, too");
+  command.add_flag("--dark-bath", protocol.dark_bath,
+                   "what the specimen hangs in gives no signal: `diastole lv` finds the walls of such cines");
 }
 
 }  // namespace
@@ -383,51 +434,7 @@ void add_scan(CommandLine& line) {
   add_study(*command, a.study);
   add_values(*command, a.study);
   command->add_option("-o,--output", a.folder, "the folder to make")->required();
-  command->add_option("--short-axis", a.protocol.short_axis_mm, "heights of slices across the axis, mm")
-      ->delimiter(',')
-      ->expected(0, 64);
-  command
-      ->add_option("--long-axis", a.protocol.long_axis_deg,
-                   "slices along the axis, turned so many degrees from x")
-      ->delimiter(',')
-      ->expected(0, 64);
-  command->add_option("--fov", a.protocol.field_of_view_mm, "field of view, mm")
-      ->check(positive_number)
-      ->capture_default_str();
-  command->add_option("--matrix", a.protocol.matrix, "pixels each way")
-      ->check(CLI::Range(32, 512))
-      ->capture_default_str();
-  command->add_option("--acquired", a.protocol.acquired, "share of the phase-encoding lines that is measured")
-      ->check(CLI::Range(0.3, 1.0))
-      ->capture_default_str();
-  command->add_option("--thickness", a.protocol.thickness_mm, "of a slice, mm")
-      ->check(positive_number)
-      ->capture_default_str();
-  command->add_option("--tag-spacing", a.protocol.tags.spacing_mm, "mm")
-      ->check(positive_number)
-      ->capture_default_str();
-  command
-      ->add_option("--tag-angles", a.protocol.tags.angles_deg, "of the tags' normals from the rows, degrees")
-      ->delimiter(',')
-      ->expected(1, 8);
-  command
-      ->add_option("--tag-pulses", a.protocol.tags.weights,
-                   "flip angles in proportion: 1,1 or binomial, as 1,3,3,1")
-      ->delimiter(',')
-      ->expected(2, 8)
-      ->check(positive_number);
-  command->add_flag("--grid", a.protocol.tags.grid, "all directions in one image");
-  command->add_option("--snr", a.protocol.snr, "signal of tissue over the noise of one channel")
-      ->check(positive_number)
-      ->capture_default_str();
-  command->add_option("--T1", a.protocol.T1_s, "of tissue, s")->check(positive_number)->capture_default_str();
-  command->add_option("--shading", a.protocol.shading, "of the coils, from corner to corner")
-      ->check(CLI::Range(0.0, 1.0))
-      ->capture_default_str();
-  command->add_flag("--cine", a.protocol.cine, "series without tags, too");
-  command->add_flag(
-      "--dark-bath", a.protocol.dark_bath,
-      "what the specimen hangs in gives no signal: `diastole lv` finds the walls of such cines");
+  add_protocol(*command, a.protocol);
   command->add_flag(
       "--flow", a.flow,
       "phase contrast of the tube that fills the specimen, too; the frames must go through a whole cycle");
