@@ -138,8 +138,9 @@ ExitCode run_pv(const PvArguments& arguments, const CommandOutput& out) {
                             "Name the page or the table to write, for example curve.html.");
   const Study study = read_study(arguments.study);
   remark_on_imaged_load(study, "pv");
-  const std::vector<Finding> findings = remark_on_model(study);
-  ElasticModel model = make_affected_model(study, with_progress("pv"));
+  std::vector<Finding> findings;
+  ElasticModel model = make_affected_model(study, with_progress("pv"), &findings);
+  print_findings(findings, stderr);
   require_closed_cavity(study, model);
   remark_on_size(model.mesh(), "pv");
   const Interruption interruption;

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "estimator/cli/commands.hpp"
+#include "estimator/cli/output_files.hpp"
 #include "estimator/cli/solution_json.hpp"
 #include "estimator/cli/solution_outputs.hpp"
 #include "estimator/cli/study_options.hpp"
@@ -24,6 +25,7 @@
 #include "estimator/io/finding_json.hpp"
 #include "estimator/io/measurement.hpp"
 #include "estimator/io/study.hpp"
+#include "estimator/mesh/collapsed_edge.hpp"
 #include "estimator/mesh/point_locator.hpp"
 #include "estimator/model/affected_model.hpp"
 #include "estimator/model/study_model.hpp"
@@ -83,8 +85,7 @@ std::vector<Probe> locate_probes(const HermiteMesh& mesh, const std::vector<std:
 nlohmann::ordered_json fields_json(const ElasticModel& model, const ElasticState& state,
                                    const MaterialPoint& point) {
   constexpr double least_relative_volume = 1e-9;
-  const Eigen::Matrix3d tangents = model.mesh().xi_gradient(model.mesh().reference(), point);
-  if (!(tangents.determinant() > least_relative_volume * std::pow(tangents.norm(), 3))) return nullptr;
+  if (is_collapsed(model.mesh(), point, least_relative_volume)) return nullptr;
   const PointFields fields = point_fields(model.system(), state, point);
   const std::vector<std::string> names = scalar_field_names(fields.fibre.has_value());
   const std::vector<double> values = scalar_fields(fields);
@@ -271,16 +272,19 @@ ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
   const Study study = read_study(arguments.study);
   require_frames(arguments, study);
   arguments.outputs.require(study, arguments.frames);
-  const std::vector<Finding> findings = remark_on_model(study);
+  std::vector<Finding> findings;
   SolveOptions options = with_progress("solve");
   options.check_stability = true;
   std::optional<UnloadedModel> unloaded;
   std::optional<ElasticModel> as_given;
   if (arguments.study.unload) {
+    findings = model_findings(study);  // before a search that takes its time
+    print_findings(findings, stderr);
     unloaded = unload(study, options);
   } else {
+    as_given = make_affected_model(study, std::move(options), &findings);
+    print_findings(findings, stderr);
     remark_on_imaged_load(study, "solve");
-    as_given = make_affected_model(study, std::move(options));
   }
   ElasticModel& model = unloaded ? unloaded->model : *as_given;
   require_fibres_for_tension(arguments, model);

@@ -4,9 +4,6 @@
 
 #include <cstdio>
 
-#include "estimator/cli/output_files.hpp"
-#include "estimator/model/affected_model.hpp"
-
 namespace diastole {
 
 void add_study(CLI::App& command, StudyOptions& options) {
@@ -36,12 +33,6 @@ void remark_on_imaged_load(const Study& study, std::string_view command) {
              "diastole {}: the shape was imaged at {:g} kPa, and is taken as free of stress here; --unload "
              "of solve, fit, montecarlo, design and mesh export finds the one that is.\n",
              command, study.imaged_at->pressure_kPa);
-}
-
-std::vector<Finding> remark_on_model(const Study& study) {
-  std::vector<Finding> findings = model_findings(study);
-  print_findings(findings, stderr);
-  return findings;
 }
 
 Study read_study(const StudyOptions& options) {

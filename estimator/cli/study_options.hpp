@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "estimator/fe/elastic_model.hpp"
-#include "estimator/io/finding.hpp"
 #include "estimator/io/study.hpp"
 
 namespace diastole {
@@ -42,9 +41,6 @@ inline double seconds_since(Clock::time_point begun) {
 
 /// States on standard error, in the name of a command, that a shape that was imaged under load is taken as free of it.
 void remark_on_imaged_load(const Study& study, std::string_view command);
-
-/// The same of what of the study the specimen's mechanics does not take as it may be meant (affected_model.hpp), which it returns.
-std::vector<Finding> remark_on_model(const Study& study);
 
 /// A line on standard error for Newton's iterations, one a second at most, once the work has lasted longer than people like
 /// to wait. `command` begins the line.

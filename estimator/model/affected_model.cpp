@@ -47,6 +47,24 @@ bool is_of_gel(const Effect& effect) {
 /// In gel it shows in recordings only.
 bool is_of_the_rig(const Effect& effect) { return !effect.parameters().empty() && !is_of_gel(effect); }
 
+/// Effects that are one of the specimen's pressures alone.
+void add_effect_findings(const Study& study, std::vector<Finding>& findings) {
+  const EffectLibrary library = effects_known_to(study);
+  for (const std::string& id : study.effects) {
+    const Effect& effect = effect_named(library, study, id);
+    if (effect.text().port != Port::specimen) continue;
+    if (!effect.field_parameters().empty() && !(is_gel(study) && is_of_the_rig(effect))) continue;
+    findings.push_back(
+        {Severity::warning, "effect-of-recordings",
+         fmt::format("{} changes the specimen's pressure in recordings (explain, simulate), and "
+                     "nothing of its deformation here",
+                     id),
+         study.file.string(), 1.0, "",
+         "What is computed is the specimen without it; leave it out of [model] effects to be "
+         "rid of this remark."});
+  }
+}
+
 }  // namespace
 
 bool is_gel(const Study& study) {
@@ -64,20 +82,7 @@ bool shows_in_images(const Study& study) {
 
 std::vector<Finding> model_findings(const Study& study) {
   std::vector<Finding> findings = fibre_findings(study);
-  const EffectLibrary library = effects_known_to(study);
-  for (const std::string& id : study.effects) {
-    const Effect& effect = effect_named(library, study, id);
-    if (effect.text().port != Port::specimen) continue;
-    if (!effect.field_parameters().empty() && !(is_gel(study) && is_of_the_rig(effect))) continue;
-    findings.push_back(
-        {Severity::warning, "effect-of-recordings",
-         fmt::format("{} changes the specimen's pressure in recordings (explain, simulate), and "
-                     "nothing of its deformation here",
-                     id),
-         study.file.string(), 1.0, "",
-         "What is computed is the specimen without it; leave it out of [model] effects to be "
-         "rid of this remark."});
-  }
+  add_effect_findings(study, findings);
   return findings;
 }
 
@@ -113,19 +118,24 @@ FieldElasticity elasticity_of(const FieldModel& model, const HermiteMesh& mesh, 
   return result;
 }
 
-ElasticModel make_affected_model(const Study& study, SolveOptions options) {
+ElasticModel make_affected_model(const Study& study, SolveOptions options, std::vector<Finding>* findings) {
   Study plain = study;
   plain.effects.clear();
-  if (!shows_in_images(study)) return make_model(plain, std::move(options));
-  if (!is_gel(study)) return ChangeableSpecimen(study).with(specimen_change_of(study), options);
+  const auto with_findings = [&](ElasticModel model) {
+    if (findings != nullptr) add_effect_findings(study, *findings);
+    return model;
+  };
+  if (!shows_in_images(study)) return with_findings(make_model(plain, std::move(options), findings));
+  if (!is_gel(study))
+    return with_findings(ChangeableSpecimen(study, findings).with(specimen_change_of(study), options));
   const FieldModel field = field_model_of(study);
   std::get<AnnulusSpecimen>(plain.specimen).inner_radius_mm = field.inner_radius_mm;
-  const ElasticModel base = make_model(plain);
+  const ElasticModel base = make_model(plain, {}, findings);
   FieldElasticity elastic = elasticity_of(field, base.mesh(), base.element_parameter(0, 0));
   elastic.options.solve = std::move(options);
   elastic.options.bulk_modulus_kPa = study.compression.bulk_modulus_kPa;
   elastic.options.volume_stiffness_kPa = study.compression.volume_stiffness_kPa;
-  return {base.mesh(), *elastic.law, std::move(elastic.options)};
+  return with_findings({base.mesh(), *elastic.law, std::move(elastic.options)});
 }
 
 FieldModel field_change_of(const Study& study) {

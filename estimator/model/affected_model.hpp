@@ -23,8 +23,10 @@ FieldElasticity elasticity_of(const FieldModel& model, const HermiteMesh& mesh, 
 bool is_gel(const Study& study);
 
 /// make_model (estimator/model/study_model.hpp) with the study's effects: those of gel, or those of any other specimen
-/// (changed_specimen.hpp). Throws InputError besides if the specimen cannot have them.
-ElasticModel make_affected_model(const Study& study, SolveOptions options = {});
+/// (changed_specimen.hpp). Throws InputError besides if the specimen cannot have them. `findings` gets those of model_findings, without
+/// another fit of measured fibres.
+ElasticModel make_affected_model(const Study& study, SolveOptions options = {},
+                                 std::vector<Finding>* findings = nullptr);
 
 /// Whether one of the study's effects does.
 bool shows_in_images(const Study& study);

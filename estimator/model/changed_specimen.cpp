@@ -33,9 +33,9 @@ bool has_one_held_end(const HermiteMesh& mesh) {
 
 }  // namespace
 
-ChangeableSpecimen::ChangeableSpecimen(Study study) {
+ChangeableSpecimen::ChangeableSpecimen(Study study, std::vector<Finding>* findings) {
   study.effects.clear();
-  parts_ = std::make_shared<const SpecimenParts>(specimen_parts(study));
+  parts_ = std::make_shared<const SpecimenParts>(specimen_parts(study, {}, findings));
   stiffness_ = std::make_shared<const InclusionStiffness>(mesh());
   depths_ = std::make_shared<const std::vector<double>>(NodalLines(mesh()).depths());
 }

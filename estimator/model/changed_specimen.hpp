@@ -20,8 +20,8 @@ namespace diastole {
 
 class ChangeableSpecimen {
  public:
-  /// Throws InputError as make_model does. The study's own effects are left out.
-  explicit ChangeableSpecimen(Study study);
+  /// Throws InputError as make_model does. The study's own effects are left out. `findings` as study_body's.
+  explicit ChangeableSpecimen(Study study, std::vector<Finding>* findings = nullptr);
 
   [[nodiscard]] const HermiteMesh& mesh() const { return parts_->body.mesh; }
   /// Whether it can have that effect.

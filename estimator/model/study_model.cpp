@@ -215,19 +215,8 @@ MeshBody refined_body(const Study& study) {
   return body;
 }
 
-}  // namespace
-
-MeshBody study_body(const Study& study) {
-  MeshBody body = refined_body(study);
-  if (study.fibres) body.fibres = measured_fibres(study, body.mesh, measured_directions(study)).fibres;
-  return body;
-}
-
-std::vector<Finding> fibre_findings(const Study& study) {
-  if (!study.fibres) return {};
-  const std::vector<FibrePoint> points = measured_directions(study);
-  const FibresThroughPoints found = measured_fibres(study, refined_body(study).mesh, points);
-  std::vector<Finding> findings;
+void add_fibre_findings(const Study& study, const std::vector<FibrePoint>& points,
+                        const FibresThroughPoints& found, std::vector<Finding>& findings) {
   const auto add = [&](const char* id, std::string what, double number, const char* unit) {
     findings.push_back({Severity::warning, id, std::move(what), study.fibres->string(), number, unit,
                         "Check that the fibres are this specimen's, and where it lies in them "
@@ -249,6 +238,23 @@ std::vector<Finding> fibre_findings(const Study& study) {
             "their errors are {:.1f}",
             found.rms_deg, std::sqrt(squares)),
         found.rms_deg, "degrees");
+}
+
+}  // namespace
+
+MeshBody study_body(const Study& study, std::vector<Finding>* findings) {
+  MeshBody body = refined_body(study);
+  if (!study.fibres) return body;
+  const std::vector<FibrePoint> points = measured_directions(study);
+  FibresThroughPoints found = measured_fibres(study, body.mesh, points);
+  if (findings != nullptr) add_fibre_findings(study, points, found, *findings);
+  body.fibres = std::move(found.fibres);
+  return body;
+}
+
+std::vector<Finding> fibre_findings(const Study& study) {
+  std::vector<Finding> findings;
+  if (study.fibres) (void)study_body(study, &findings);
   return findings;
 }
 
@@ -262,7 +268,7 @@ Placement placement_of(const Study& study) {
   return placement;
 }
 
-SpecimenParts specimen_parts(const Study& study, SolveOptions options) {
+SpecimenParts specimen_parts(const Study& study, SolveOptions options, std::vector<Finding>* findings) {
   const Law& law = law_of(study);
   if (!study.effects.empty()) {
     refuse(study, "model.effects", fmt::format("the model has no effect \"{}\"", study.effects.front()),
@@ -271,7 +277,7 @@ SpecimenParts specimen_parts(const Study& study, SolveOptions options) {
   ElasticOptions elastic;
   elastic.parameters = start_values(study, law);
   elastic.solve = std::move(options);
-  MeshBody body = study_body(study);
+  MeshBody body = study_body(study, findings);
   require_axes(study, law, body);
   require_ends(study, body.mesh);
   if (body.fibres) elastic.material_axes = material_axes_of(*body.fibres);
@@ -282,8 +288,8 @@ SpecimenParts specimen_parts(const Study& study, SolveOptions options) {
   return {std::move(body), &law, std::move(elastic)};
 }
 
-ElasticModel make_model(const Study& study, SolveOptions options) {
-  SpecimenParts parts = specimen_parts(study, std::move(options));
+ElasticModel make_model(const Study& study, SolveOptions options, std::vector<Finding>* findings) {
+  SpecimenParts parts = specimen_parts(study, std::move(options), findings);
   ElasticModel model(std::move(parts.body.mesh), *parts.law, std::move(parts.options));
   require_chamber_wall(study, model);
   return model;

@@ -10,10 +10,11 @@
 namespace diastole {
 
 /// The specimen's mesh, refined as the study says, and its fibres: those that the study has measured, if any. Throws InputError if a mesh
-/// file is wrong or cannot be refined, or if measured fibres are not in the mesh.
-MeshBody study_body(const Study& study);
+/// file is wrong or cannot be refined, or if measured fibres are not in the mesh. `findings` gets what is doubtful about these: they lie
+/// beside the mesh, or are not what a field in it can be.
+MeshBody study_body(const Study& study, std::vector<Finding>* findings = nullptr);
 
-/// What is doubtful about the study's measured fibres: they lie beside the mesh, or are not what a field in it can be.
+/// These findings alone.
 std::vector<Finding> fibre_findings(const Study& study);
 
 /// From the specimen's axes to the images': [images.to_specimen]; nothing moves without it.
@@ -30,8 +31,11 @@ struct SpecimenParts {
 /// parameters or has one that it does not know, if a start lies outside what the law allows, or if it names
 /// an effect (the model has none), if the law needs axes and the body has no fibres, if the mesh file names no face
 /// to hold, or if it names no outer wall for the chamber, or one with a free rim for a sealed one.
-SpecimenParts specimen_parts(const Study& study, SolveOptions options = {});
-ElasticModel make_model(const Study& study, SolveOptions options = {});
+/// `findings` as study_body's.
+SpecimenParts specimen_parts(const Study& study, SolveOptions options = {},
+                             std::vector<Finding>* findings = nullptr);
+ElasticModel make_model(const Study& study, SolveOptions options = {},
+                        std::vector<Finding>* findings = nullptr);
 
 /// Throws InputError if the model has no wall for a cavity pressure to push on (a mesh file without `inner`).
 void require_cavity(const Study& study, const ElasticModel& model);
