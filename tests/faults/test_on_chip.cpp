@@ -6,13 +6,10 @@
 
 #include <algorithm>
 #include <array>
-#include <filesystem>
 #include <vector>
 
 #include "protocol/contract/input_error.hpp"
-#include "tests/faults/fault_table.hpp"
-#include "tests/sanitized.hpp"
-#include "tests/tools/sim_board/chip_bench.hpp"
+#include "tests/faults/chip_trials.hpp"
 #include "tests/tools/sim_board/flash_bench.hpp"
 #include "tests/tools/sim_board/flash_history.hpp"
 #include "tests/tools/sim_board/late_trigger.hpp"
@@ -21,15 +18,6 @@ namespace diastole::faults {
 namespace {
 
 using namespace sim_board_test;
-
-#define NEEDS_FULL_COUNTS_ON_CHIP()                                                                       \
-  if (trials(0, 1) == 0 || sanitized) GTEST_SKIP() << "with the full counts only (DIASTOLE_FAULTS=full)"; \
-  if (!std::filesystem::exists(sim_board_test::firmware))                                                 \
-  GTEST_SKIP() << "no " << sim_board_test::firmware << ": build the preset `firmware` first"
-
-uint64_t random_ns(std::mt19937& random, double from_ms, double to_ms) {
-  return static_cast<uint64_t>(1e6 * between(random, from_ms, to_ms));
-}
 
 TEST(Faults, BrownOut) {
   NEEDS_FULL_COUNTS_ON_CHIP();
@@ -163,6 +151,45 @@ TEST(Faults, CrystalFails) {
   EXPECT_LE(slowest_ns, 10'000U);
   add_to_table({"crystal fails", "at random moments of homing", tried, survived,
                 fmt::format("motor off within {} us; fault 10 after it", slowest_ns / 1000)});
+}
+
+/// Those that boards have, and none; the internal oscillator that they are measured by is told from them by 15 %.
+TEST(Faults, AnotherCrystal) {
+  NEEDS_FULL_COUNTS_ON_CHIP();
+  constexpr std::array<uint32_t, 8> crystals_Hz{12'000'000, 25'000'000, 16'000'000, 10'000'000,
+                                                4'000'000,  6'000'000,  26'000'000, 0};
+  const auto refuses = [](auto&& order) {
+    try {
+      order();
+      return false;
+    } catch (const HardwareError&) {
+      return true;
+    }
+  };
+  const int tried = trials(0, 40);
+  const int survived = survivors(tried, [&](int k, std::mt19937& random) {
+    constexpr double most_ppm = 100;
+    const double off = 1 + 1e-6 * between(random, -most_ppm, most_ppm);
+    const uint32_t crystal_Hz = crystals_Hz.at(static_cast<size_t>(k) % crystals_Hz.size());
+    ChipBench bench({.crystal_Hz = static_cast<uint32_t>(off * crystal_Hz)});
+    for (int start = 0; start < 2; ++start) {
+      bench.connect(1'000);
+      bench.pass(random_ns(random, 0, 200));
+      const wire::Status status = bench.client.status();
+      if (status.state != wire::State::faulted || status.fault != wire::Fault::clock) return false;
+      if (!refuses([&] { bench.client.home(); }) || !refuses([&] { bench.client.clear_fault(); }))
+        return false;
+      if (bench.board().statistics().core_Hz != 168'000'000) return false;
+      random() % 2 == 0 ? bench.board().reset() : bench.board().power_cycle();
+    }
+    const bool moved = std::ranges::any_of(bench.desk.edges, [](const sim_controller::PinEdge& edge) {
+      return edge.value == 1 &&
+             (edge.pin == sim_controller::Pin::step || edge.pin == sim_controller::Pin::enable);
+    });
+    return !moved && bench.board().statistics().notes.empty();
+  });
+  add_to_table({"another crystal", "none, or 4 to 26 MHz in place of 8", tried, survived,
+                "fault 10 and no motion, the core at 168 MHz, at each start"});
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Faults of line, controller, instrument and disk, in virtual time: firmware, client, acquisition and journal in
+// Faults of line, controller, instrument, inputs and disk, in virtual time: firmware, client, acquisition and journal in
 // one process.
 
 #include <fmt/format.h>
@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
+#include <optional>
 
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/reader.hpp"
@@ -176,6 +177,74 @@ TEST(Faults, InstrumentStalls) {
   });
   add_to_table({"instrument stalls", "10 ms to 10 s, at random moments", tried, survived,
                 fmt::format("received + gaps = expected; {} samples at most", most_missing)});
+}
+
+/// A gating line that bounces from the beginning of time on, until some time into the run.
+class BouncingGate final : public GateInputs {
+ public:
+  BouncingGate(SessionOnDesk& session, double pulses_a_second, double until_s)
+      : session_(session), interval_ns_(1e9 / pulses_a_second), until_ns_(1e9 * until_s) {}
+  [[nodiscard]] std::string describe() const override { return "gate that bounces"; }
+  [[nodiscard]] bool counts_pulses() const override { return true; }
+  [[nodiscard]] bool sees_estop() const override { return false; }
+  [[nodiscard]] bool estop_pressed() const override { return false; }
+  /// What came at rest is taken by the first call, when the run begins.
+  GateReading take() override {
+    const auto now_ns = static_cast<double>(session_.desk.now_ns);
+    const bool first = !begun_ns_;
+    if (first) begun_ns_ = now_ns;
+    GateReading reading;
+    for (; next_ns_ <= std::min(now_ns, *begun_ns_ + until_ns_); next_ns_ += interval_ns_)
+      reading.note_pulse(static_cast<uint64_t>(next_ns_));
+    if (first)
+      at_rest = reading;
+    else
+      in_run += reading.pulses;
+    return reading;
+  }
+
+  GateReading at_rest;
+  uint64_t in_run = 0;
+
+ private:
+  SessionOnDesk& session_;
+  double interval_ns_, until_ns_, next_ns_ = 0;
+  std::optional<double> begun_ns_;
+};
+
+TEST(Faults, GateBounces) {
+  constexpr size_t room_for_remarks = 1'000;  // bytes
+  size_t quiet_bytes = 0, most_bytes = 0;
+  {
+    SessionOnDesk session(short_session);
+    session.run();
+    quiet_bytes = std::filesystem::file_size(session.journal);
+  }
+  uint64_t most_pulses = 0;
+  const int tried = trials(20, 200);
+  const int survived = survivors(tried, [&](int, std::mt19937& random) {
+    SessionOnDesk session(short_session);
+    BouncingGate gate(session, std::exp(between(random, std::log(400), std::log(100'000))),
+                      between(random, 0.02, 2.5));
+    session.gate = &gate;
+    session.run();
+    most_pulses = std::max(most_pulses, gate.at_rest.pulses + gate.in_run);
+    const AssembledRun assembled = session.assemble();
+    const auto remarks = std::ranges::count_if(
+        session.remarks, [](const RunRemark& remark) { return remark.code == "gate_count"; });
+    const bool named = std::ranges::any_of(session.remarks, [](const RunRemark& remark) {
+      return remark.level == "error" && remark.text.find("the line bounces") != std::string::npos;
+    });
+    const size_t bytes = std::filesystem::file_size(session.journal);
+    most_bytes = std::max(most_bytes, bytes - std::min(bytes, quiet_bytes));
+    return session.outcome.end == "completed" && named && remarks <= 2 &&
+           gate.at_rest.pulse_ns.size() <= GateReading::most_kept &&
+           session.outcome.counts.gate_pulses == gate.in_run && bytes <= quiet_bytes + room_for_remarks &&
+           assembled.run.trigger_s.size() == 2 && assembled.samples_missing == 0 && books_balance(assembled);
+  });
+  add_to_table({"gate line bounces", "at rest and in a run, 400 to 100,000/s", tried, survived,
+                fmt::format("counted, named in two remarks at most: {} pulses, {} more bytes of journal",
+                            most_pulses, most_bytes)});
 }
 
 TEST(Faults, DiskFull) {
