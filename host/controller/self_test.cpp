@@ -33,7 +33,9 @@ constexpr double level_error_codes =
 /// The board's crystal, and what time synchronisation may slew the host's clock by (MAXFREQ of adjtimex).
 constexpr double crystal_ppm = 50, slewed_ppm = 500;
 
-const char* const ttl_wire = "Put a wire from PA1 (TTL) to PA5, as short as the one from PA6 to PA3.";
+const char* const ttl_wire =
+    "Put a wire from PA1 (TTL) to PA5, as short as the one from PA6 to PA3. If it is there, something holds "
+    "PA1: take off whatever else is on it.";
 const char* const step_wire = "Put a wire from PA6 (STEP) to PA3.";
 const char* const r_wave_wire = "Put a wire from PA4 (R-wave), or from behind its follower, to PC3.";
 

@@ -12,8 +12,9 @@ struct LoopBack {
   bool step = true, ttl = true, r_wave = true;  ///< whether the wire is there
   uint64_t lost_step = 0;  ///< this rise of STEP does not arrive, counted from 1; 0: all do
   uint64_t step_delay_ns = 0, ttl_delay_ns = 0;
-  bool ttl_bounces = false;  ///< each pulse comes as two
-  double r_wave_gain = 1;    ///< of the output as it arrives
+  uint64_t step_jitter_ns = 0, ttl_jitter_ns = 0;  ///< by which every other pulse comes later still
+  bool ttl_bounces = false;                        ///< each pulse comes as two
+  double r_wave_gain = 1;                          ///< of the output as it arrives
   double r_wave_offset_V = 0;
   uint64_t r_wave_delay_ns = 0;
 };

@@ -219,6 +219,11 @@ std::size_t SimBoard::bytes_on_the_way() const {
 
 void SimBoard::drive(Pin pin, bool level, uint64_t time_ns) { board_->chip.world.plan(time_ns, pin, level); }
 
+void SimBoard::short_pin(Pin pin, std::optional<bool> level) {
+  board_model::Chip& chip = board_->chip;
+  chip.ports[pin.port]->short_to(pin.number, level, chip.clock.now());
+}
+
 bool SimBoard::level(Pin pin) const { return board_->chip.pins.level(pin); }
 
 void SimBoard::drive_analog(Pin pin, std::function<double(uint64_t)> volts) {

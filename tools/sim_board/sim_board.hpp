@@ -124,6 +124,8 @@ class SimBoard {
 
   /// Drives a pin from outside from `time_ns` on. Undriven inputs follow their pull-up, else they are low.
   void drive(Pin pin, bool level, uint64_t time_ns);
+  /// A short to ground or to the supply from now on: the pin has this level whatever the chip puts out; nullopt: no more.
+  void short_pin(Pin pin, std::optional<bool> level);
   [[nodiscard]] bool level(Pin pin) const;
   /// Volts on a pin from outside, as the converter sees them when it asks. Others have 0 V.
   void drive_analog(Pin pin, std::function<double(uint64_t time_ns)> volts);

@@ -15,6 +15,7 @@
 #include "protocol/contract/input_error.hpp"
 #include "tests/tools/sim_board/chip_bench.hpp"
 #include "tests/tools/sim_board/late_trigger.hpp"
+#include "tests/tools/sim_board/miniature_host.hpp"
 
 namespace diastole::sim_board_test {
 namespace {
@@ -213,6 +214,24 @@ TEST_F(ChipFaults, ATriggerThatComesTooLateIsRaisedAndToldWithItsOwnTime) {
       EXPECT_LT(found.late_ns(), (due_us + 10) * 1000) << held_us;
     }
   }
+}
+
+TEST_F(ChipFaults, ATtlPinThatIsHeldLowLosesEveryTriggerAndIsReported) {
+  EmulatedController controller({read_image(firmware)});
+  MiniatureHost host(controller);
+  wire::AddSegment hold = wire::AddSegment::example();
+  hold.waveform = wire::Waveform::hold;
+  hold.cycles = 3;
+  ASSERT_TRUE(host.prepare());
+  ASSERT_TRUE(host.ask(hold));
+  controller.board().short_pin(diastole_wiring().ttl.pin, false);
+  ASSERT_TRUE(host.run_program(30'000 * ms));
+  EXPECT_EQ(host.ended->reason, wire::RunEnd::completed);
+  EXPECT_EQ(host.ended->triggers, 0U);
+  EXPECT_EQ(host.ended->triggers_lost, hold.cycles);
+  ASSERT_EQ(host.triggers.size(), hold.cycles);
+  for (const wire::Trigger& trigger : host.triggers)
+    EXPECT_EQ(trigger.seen, 0U) << trigger.cycle;
 }
 
 /// The emulated chip's first number after RNGEN is the same on every board.

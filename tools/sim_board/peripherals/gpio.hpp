@@ -5,6 +5,7 @@
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <optional>
 
 #include "tools/sim_board/core/device.hpp"
 #include "tools/sim_board/core/pins.hpp"
@@ -20,6 +21,7 @@ class Gpio final : public RegisterBlock {
  public:
   Gpio(uint8_t port, const Clock& clock, PinLog& log) : port_(port), clock_(clock), log_(log) {
     driven_.fill(-1);
+    shorted_.fill(-1);
     reset();
   }
 
@@ -50,6 +52,11 @@ class Gpio final : public RegisterBlock {
   /// The outside world drives the pin; it keeps doing so through resets.
   void drive(uint8_t number, bool level, Cycles at) {
     driven_[number] = level ? 1 : 0;
+    update(number, at);
+  }
+  /// A short holds the pin at a level, whatever drives it and through resets; nullopt: no more.
+  void short_to(uint8_t number, std::optional<bool> level, Cycles at) {
+    shorted_[number] = level ? static_cast<int8_t>(*level) : int8_t{-1};
     update(number, at);
   }
   /// A timer's channel takes its pin's level, or gives it again.
@@ -109,6 +116,7 @@ class Gpio final : public RegisterBlock {
     return alternate_[number / 8] >> (4 * (number % 8)) & 0xf;
   }
   [[nodiscard]] bool level_of(uint32_t number) const {
+    if (shorted_[number] >= 0) return shorted_[number] == 1;
     const uint32_t pull = pupdr_ >> (2 * number) & 3;
     const bool rest = driven_[number] >= 0 ? driven_[number] == 1 : pull == 1;
     switch (mode(number)) {
@@ -155,7 +163,7 @@ class Gpio final : public RegisterBlock {
   PinLog& log_;
   uint32_t moder_ = 0, otyper_ = 0, ospeedr_ = 0, pupdr_ = 0, odr_ = 0, lckr_ = 0;
   std::array<uint32_t, 2> alternate_{};
-  std::array<int8_t, pins_per_port> driven_{};                           ///< -1: not driven from outside
+  std::array<int8_t, pins_per_port> driven_{}, shorted_{};               ///< -1: not from outside
   std::array<TimerOutput, pins_per_port> sources_{};                     ///< of pins in alternate mode
   std::array<std::array<bool, 5>, 15> timer_levels_{}, timer_inputs_{};  ///< by timer and channel number
 };
