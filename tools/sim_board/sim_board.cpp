@@ -151,7 +151,7 @@ std::size_t SimBoard::marginal_words() const { return board_->chip.flash.margina
 
 uint32_t SimBoard::option_bytes() const { return board_->chip.flash.option_bytes(); }
 
-uint32_t SimBoard::flash_access_control() const { return board_->chip.flash.read(0); }
+uint32_t SimBoard::flash_access_control() const { return board_->chip.flash.access_control(); }
 
 void SimBoard::hold_core(bool held) {
   constexpr uint32_t apb1_freeze = 0xe004'2008, watchdog_stops = 1U << 12;
@@ -265,7 +265,7 @@ uint32_t SimBoard::timer_count(uint8_t number) const {
   const auto& timers = board_->chip.timers;
   const auto timer =
       std::ranges::find_if(timers, [number](const auto& each) { return each->shape().number == number; });
-  return (*timer)->read(counter);
+  return (*timer)->read(counter).value();
 }
 
 BoardStatistics SimBoard::statistics() const {

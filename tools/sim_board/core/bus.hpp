@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -51,13 +52,18 @@ class Bus {
   /// How the state of a gate is asked for; without it all are open.
   void gate_by(std::function<ClockState(ClockGate)> clock_of) { clock_of_ = std::move(clock_of); }
 
-  /// `bytes` is 1, 2 or 4. A block that nobody models reads 0 and is noted once.
+  /// `bytes` is 1, 2 or 4. A register that nobody models reads 0 and is noted.
   uint32_t read(uint32_t address, uint32_t bytes) {
     const Place* place = find(address, "read");
     if (place == nullptr) return 0;
-    if (auto wrong = judge_.read(address, bytes)) notes_.add(*wrong);
-    const uint32_t word = place->device->read((address - place->base) & ~3U);
-    return (word >> (8 * (address & 3))) & width_mask(bytes);
+    const std::optional<std::string> wrong = judge_.read(address, bytes);
+    const std::optional<uint32_t> word = place->device->read((address - place->base) & ~3U);
+    if (wrong)
+      notes_.add(*wrong);
+    else if (!word)
+      notes_.add("read of a register that is not modelled: " + place->name + " at " +
+                 hexadecimal(address & ~3U));
+    return (word.value_or(0) >> (8 * (address & 3))) & width_mask(bytes);
   }
   void write(uint32_t address, uint32_t value, uint32_t bytes) {
     const Place* place = find(address, "write");

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <initializer_list>
+#include <optional>
 #include <span>
 
 #include "tools/sim_board/core/clock.hpp"
@@ -17,8 +18,8 @@ class Device {
   Device& operator=(const Device&) = delete;
   virtual ~Device() = default;
 
-  /// Register at `offset` (a multiple of 4), with the side effects of reading it.
-  virtual uint32_t read(uint32_t offset) = 0;
+  /// Register at `offset` (a multiple of 4), with the side effects of reading it; none: it is not modelled.
+  virtual std::optional<uint32_t> read(uint32_t offset) = 0;
 
   /// Writes the bits of `mask` (0xff.. for narrower accesses, shifted into place) of the register at
   /// `offset`.
@@ -44,16 +45,16 @@ constexpr uint32_t merged(uint32_t old, uint32_t value, uint32_t mask) {
 /// leaves the rest to these.
 class RegisterBlock : public Device {
  public:
-  uint32_t read(uint32_t offset) override {
+  std::optional<uint32_t> read(uint32_t offset) override {
     const uint32_t* held = word(offset);
-    return held != nullptr ? *held : 0;
+    return held != nullptr ? std::optional(*held) : std::nullopt;
   }
   void write(uint32_t offset, uint32_t value, uint32_t mask) override {
     if (uint32_t* held = word(offset)) *held = merged(*held, value, mask);
   }
 
  protected:
-  /// Where the register at `offset` is kept; null: reads 0, and writing it has no effect.
+  /// Where the register at `offset` is kept; null: it is not modelled as such, and writing it has no effect.
   virtual uint32_t* word(uint32_t offset) = 0;
 
   /// The word at `offset` among `words`, which lie one after the other; null for a gap, or beyond the last.

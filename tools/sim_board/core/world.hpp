@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <map>
+#include <optional>
 
 #include "tools/sim_board/core/pins.hpp"
 #include "tools/sim_board/core/scheduler.hpp"
@@ -22,7 +23,7 @@ class World final : public Device {
     ask();
   }
 
-  uint32_t read(uint32_t) override { return 0; }
+  std::optional<uint32_t> read(uint32_t) override { return {}; }
   void write(uint32_t, uint32_t, uint32_t) override {}
   void reset() override { ask(); }
   void after_clock_change() override { ask(); }

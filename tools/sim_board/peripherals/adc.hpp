@@ -1,7 +1,7 @@
 #pragma once
 // ADC1 and the converters' common control (RM0090 13): single conversions of one channel started by software, with their
-// sampling time, at the clock that the prescaler makes. Full scale is the supply. ADC2 and ADC3 read 0; what else ADC1 can
-// do (scan, continuous, injected, triggers, DMA, watchdog) is noted.
+// sampling time, at the clock that the prescaler makes. Full scale is the supply. ADC2 and ADC3 are not modelled; what else
+// ADC1 can do (scan, continuous, injected, triggers, DMA, watchdog) is noted.
 
 #include <algorithm>
 #include <array>
@@ -32,7 +32,7 @@ class Adc final : public RegisterBlock {
   void wire(Input input) { input_ = std::move(input); }
   void set_supply_mV(uint32_t supply_mV) { supply_V_ = 1e-3 * supply_mV; }
 
-  uint32_t read(uint32_t offset) override {
+  std::optional<uint32_t> read(uint32_t offset) override {
     if (offset == common_status) return words_[status / 4];
     if (offset == data) words_[status / 4] &= ~end_of_conversion;
     return RegisterBlock::read(offset);

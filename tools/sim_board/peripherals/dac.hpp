@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <optional>
 
 #include "tools/sim_board/core/device.hpp"
 #include "tools/sim_board/core/notes.hpp"
@@ -19,7 +20,7 @@ class Dac final : public RegisterBlock {
  public:
   Dac(const Clock& clock, PinLog& log, Notes& notes) : clock_(clock), log_(log), notes_(notes) { reset(); }
 
-  uint32_t read(uint32_t offset) override {
+  std::optional<uint32_t> read(uint32_t offset) override {
     if (offset == 0x20) return channels_[0].holding | channels_[1].holding << 16;
     if (offset < first_holding || offset >= 0x20) return RegisterBlock::read(offset);
     const uint32_t holding = channels_[(offset - first_holding) / holding_registers].holding;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "tools/sim_board/core/bus.hpp"
 #include "tools/sim_board/core/memory.hpp"
@@ -20,7 +21,7 @@ class Dma final : public RegisterBlock {
   Dma(uint8_t number, Bus& bus, Memory& memory, Nvic& nvic, Notes& notes)
       : number_(number), bus_(bus), memory_(memory), nvic_(nvic), notes_(notes) {}
 
-  uint32_t read(uint32_t offset) override {
+  std::optional<uint32_t> read(uint32_t offset) override {
     if (offset >= 8) return RegisterBlock::read(offset);
     uint32_t flags = 0;
     for (uint32_t i = 0; i < 4; ++i)

@@ -32,8 +32,8 @@ class Flash final : public RegisterBlock {
   Flash(std::span<uint8_t> memory, const Clock& clock, Scheduler& scheduler, Notes& notes)
       : memory_(memory), clock_(clock), scheduler_(scheduler), notes_(notes), slot_(scheduler.add(*this)) {}
 
-  uint32_t read(uint32_t offset) override {
-    return RegisterBlock::read(offset) | (offset == 0x0c && busy_ ? busy_flag : 0);
+  std::optional<uint32_t> read(uint32_t offset) override {
+    return offset == 0x0c && busy_ ? sr_ | busy_flag : RegisterBlock::read(offset);
   }
   void write(uint32_t offset, uint32_t value, uint32_t mask) override {
     switch (offset) {

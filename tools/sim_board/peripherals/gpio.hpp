@@ -25,7 +25,7 @@ class Gpio final : public RegisterBlock {
     reset();
   }
 
-  uint32_t read(uint32_t offset) override {
+  std::optional<uint32_t> read(uint32_t offset) override {
     if (offset != 0x10) return RegisterBlock::read(offset);
     uint32_t levels = 0;
     for (uint8_t number = 0; number < pins_per_port; ++number) {

@@ -3,6 +3,7 @@
 // always ready.
 
 #include <cstdint>
+#include <optional>
 
 #include "tools/sim_board/core/device.hpp"
 
@@ -10,7 +11,7 @@ namespace diastole::board_model {
 
 class Power final : public RegisterBlock {
  public:
-  uint32_t read(uint32_t offset) override {
+  std::optional<uint32_t> read(uint32_t offset) override {
     if (offset != 0x04) return RegisterBlock::read(offset);
     return (csr_ & (1U << 8 | 1U << 9)) | regulator_ready | (below() ? 1U << 2 : 0);
   }

@@ -3,6 +3,7 @@
 // and the flags that show why the last reset happened (RM0090, 7.3).
 
 #include <algorithm>
+#include <optional>
 
 #include "tools/sim_board/core/bus.hpp"
 #include "tools/sim_board/core/nvic.hpp"
@@ -32,7 +33,7 @@ class Rcc final : public RegisterBlock {
     reset();
   }
 
-  uint32_t read(uint32_t offset) override {
+  std::optional<uint32_t> read(uint32_t offset) override {
     if (offset == csr) return csr_ | (csr_ & 1) << 1;  // LSI is ready at once
     if (is_enable(offset)) enabled_lately(offset).bits = 0;
     return RegisterBlock::read(offset);
@@ -43,7 +44,7 @@ class Rcc final : public RegisterBlock {
       if ((value & mask) >> 23 & 1) registers_[cir / 4] &= ~security_flag;
       return;
     }
-    const uint32_t whole = merged(read(offset), value, mask);
+    const uint32_t whole = merged(*read(offset), value, mask);
     if (offset == cr) return write_control(whole);
     if (offset == cfgr) return write_configuration(whole);
     if (offset == csr) {

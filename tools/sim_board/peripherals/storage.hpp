@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <utility>
 
 #include "tools/sim_board/core/device.hpp"
@@ -17,8 +18,9 @@ class Storage final : public RegisterBlock {
   explicit Storage(uint32_t status_offset = 0, uint32_t always_set = 0, bool kept = false)
       : status_offset_(status_offset), always_set_(always_set), kept_(kept) {}
 
-  uint32_t read(uint32_t offset) override {
-    return RegisterBlock::read(offset) | (offset == status_offset_ ? always_set_ : 0);
+  std::optional<uint32_t> read(uint32_t offset) override {
+    const std::optional<uint32_t> held = RegisterBlock::read(offset);
+    return held && offset == status_offset_ ? *held | always_set_ : held;
   }
   void reset() override {
     if (!kept_) registers_.fill(0);
@@ -38,11 +40,11 @@ class RandomNumbers final : public Device {
  public:
   explicit RandomNumbers(uint32_t seed) : state_(seed != 0 ? seed : 1) {}
 
-  uint32_t read(uint32_t offset) override {
+  std::optional<uint32_t> read(uint32_t offset) override {
     if (offset == 0x00) return control_;
-    if (offset == 0x04) return (control_ & 4) != 0 ? 1 : 0;
-    if (offset != 0x08) return 0;
-    if (std::exchange(first_, false)) return 0x5555'5555;
+    if (offset == 0x04) return (control_ & 4) != 0 ? 1U : 0U;
+    if (offset != 0x08) return {};
+    if (std::exchange(first_, false)) return 0x5555'5555U;
     state_ ^= state_ << 13;
     state_ ^= state_ >> 17;
     state_ ^= state_ << 5;

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <functional>
 #include <iterator>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -23,7 +24,7 @@ class SysTick final : public Device {
       : clock_(clock), scheduler_(scheduler), nvic_(nvic), slot_(scheduler.add(*this)) {}
 
   /// Offsets 0x10 ... 0x1c, as in the system control space.
-  uint32_t read(uint32_t offset) override {
+  std::optional<uint32_t> read(uint32_t offset) override {
     settle();
     switch (offset) {
       case 0x10: {
@@ -34,9 +35,9 @@ class SysTick final : public Device {
       case 0x14:
         return reload_;
       case 0x18:
-        return counting() ? static_cast<uint32_t>((zero_at_ - clock_.now()) / cycles_per_count()) : 0;
+        return counting() ? static_cast<uint32_t>((zero_at_ - clock_.now()) / cycles_per_count()) : 0U;
       default:
-        return 0;
+        return {};
     }
   }
   void write(uint32_t offset, uint32_t value, uint32_t mask) override {
@@ -95,7 +96,7 @@ class SystemControl final : public RegisterBlock {
  public:
   SystemControl(Nvic& nvic, SysTick& systick) : nvic_(nvic), systick_(systick) {}
 
-  uint32_t read(uint32_t offset) override {
+  std::optional<uint32_t> read(uint32_t offset) override {
     const uint32_t word = (offset & 0x7f) / 4;
     if (offset >= 0x10 && offset < 0x20) return systick_.read(offset);
     if (offset == 0x004) return irq_count / 32;
@@ -296,7 +297,10 @@ class SystemControl final : public RegisterBlock {
 class Dwt final : public Device {
  public:
   explicit Dwt(const Clock& clock) : clock_(clock) {}
-  uint32_t read(uint32_t offset) override { return offset == 0 ? control_ : offset == 4 ? count() : 0; }
+  std::optional<uint32_t> read(uint32_t offset) override {
+    if (offset == 0) return control_;
+    return offset == 4 ? std::optional(count()) : std::nullopt;
+  }
   void write(uint32_t offset, uint32_t value, uint32_t mask) override {
     held_ = count();
     since_ = clock_.now();

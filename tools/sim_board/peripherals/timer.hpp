@@ -11,6 +11,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -55,7 +56,7 @@ class Timer final : public RegisterBlock {
   }
   void wire(Wiring wiring) { wiring_ = std::move(wiring); }
 
-  uint32_t read(uint32_t offset) override {
+  std::optional<uint32_t> read(uint32_t offset) override {
     settle(clock_.now());
     capture_crystal(clock_.now());
     const bool reads_capture = offset >= 0x34 && offset <= 0x40 && input((offset - 0x34) / 4) != 0;

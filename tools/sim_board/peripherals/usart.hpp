@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <optional>
 
 #include "tools/sim_board/core/nvic.hpp"
 #include "tools/sim_board/core/scheduler.hpp"
@@ -25,7 +26,7 @@ class Usart final : public RegisterBlock {
     reset();
   }
 
-  uint32_t read(uint32_t offset) override {
+  std::optional<uint32_t> read(uint32_t offset) override {
     if (offset == 0x00) overrun_pending_clear_ = (sr_ & overrun) != 0;
     if (offset != 0x04) return RegisterBlock::read(offset);
     sr_ &= ~(receive_full | noise | framing_error);

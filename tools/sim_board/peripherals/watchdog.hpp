@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <optional>
 
 #include "tools/sim_board/core/scheduler.hpp"
 
@@ -14,6 +15,10 @@ class Watchdog final : public RegisterBlock {
   Watchdog(const Clock& clock, Scheduler& scheduler)
       : clock_(clock), scheduler_(scheduler), slot_(scheduler.add(*this)) {}
 
+  /// Updates of prescaler and reload are immediate: SR stays 0.
+  std::optional<uint32_t> read(uint32_t offset) override {
+    return offset == 0x0c ? 0U : RegisterBlock::read(offset);
+  }
   void write(uint32_t offset, uint32_t value, uint32_t mask) override {
     const uint32_t bits = value & mask;
     if (offset == 0x00) {
@@ -52,7 +57,6 @@ class Watchdog final : public RegisterBlock {
   static constexpr uint32_t key_reload = 0xaaaa, key_unlock = 0x5555, key_start = 0xcccc;
   static constexpr uint64_t tick_ns = 31'250;  // LSI, typical
 
-  /// Updates of prescaler and reload are immediate: SR stays 0.
   uint32_t* word(uint32_t offset) override { return in_order(offset, {nullptr, &prescaler_, &reload_}); }
   void reload() {
     const uint64_t divider = 4U << std::min(prescaler_, 6U);
