@@ -1,10 +1,11 @@
 #pragma once
 // The flash operations of an update on the emulated board, and the flash as a power cut in the middle of any of them
-// leaves it. So every cut can be tried without running the update up to it each time; test_flashing.cpp shows for
+// leaves it. So every cut can be tried without running the update up to it each time; test_flash_power_cuts.cpp shows for
 // some that the emulator's own power cut leaves the same bytes.
 
 #include <algorithm>
 #include <cstring>
+#include <random>
 #include <vector>
 
 #include "tools/sim_board/sim_board.hpp"
@@ -24,18 +25,23 @@ class FlashHistory {
 
   [[nodiscard]] size_t operations() const { return operations_.size(); }
 
-  /// The flash after a power cut in the middle of operation `cut`, the first being 1.
-  [[nodiscard]] std::vector<uint8_t> cut_at(size_t cut) const {
+  /// The flash after a power cut in the middle of operation `cut`, the first being 1. With `cells` an arbitrary part of a word's
+  /// bits has fallen; of an erased sector half or all reads blank, but for single bits. Without, every second bit and half.
+  [[nodiscard]] std::vector<uint8_t> cut_at(size_t cut, std::mt19937* cells = nullptr) const {
     std::vector<uint8_t> flash = before_;
     for (size_t i = 0; i + 1 < cut; ++i)
       apply(flash, operations_[i]);
     const Operation& last = operations_[cut - 1];
     if (last.bytes != 4) {
-      std::fill_n(flash.begin() + last.offset, last.bytes / 2, uint8_t{0xff});
+      const uint32_t done = cells != nullptr && (*cells)() % 2 == 0 ? last.bytes : last.bytes / 2;
+      std::fill_n(flash.begin() + last.offset, done, uint8_t{0xff});
+      constexpr uint32_t bytes_a_weak_bit = 64;
+      for (uint32_t at = 0; cells != nullptr && at < last.bytes; at += bytes_a_weak_bit)
+        flash[last.offset + at + (*cells)() % bytes_a_weak_bit] ^= static_cast<uint8_t>(1U << (*cells)() % 8);
     } else {
       uint32_t word = 0;
       std::memcpy(&word, &flash[last.offset], 4);
-      word &= ~(word & ~last.value & 0x5555'5555);
+      word &= ~(word & ~last.value & (cells != nullptr ? static_cast<uint32_t>((*cells)()) : 0x5555'5555U));
       std::memcpy(&flash[last.offset], &word, 4);
     }
     return flash;
