@@ -5,7 +5,7 @@
 
 #include "estimator/cli/commands.hpp"
 #include "estimator/cli/interruption.hpp"
-#include "estimator/explain/rig/reference_file.hpp"
+#include "estimator/explain/rig/reference_json.hpp"
 #include "estimator/io/study.hpp"
 #include "estimator/io/study_fingerprint.hpp"
 #include "estimator/io/whole_file.hpp"

@@ -31,6 +31,7 @@
 #include <ranges>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <tuple>
 #include <type_traits>
 #include <utility>
@@ -166,26 +167,55 @@ inline void round_numbers(Json& json, double (*round)(double)) {
 /// Whether a record may lack members, which then keep the values that they have.
 enum class MissingMembers { refused, kept };
 
-/// Throws nlohmann::json::exception or std::invalid_argument, which names the key, for what is missing or of another kind.
+/// A record, or a member of one, that is not as it must be: what() is what is wrong with it.
+class MemberFault : public std::invalid_argument {
+ public:
+  explicit MemberFault(const std::string& problem, std::string member = {})
+      : std::invalid_argument(problem), member_(std::move(member)) {}
+  /// "frames[2].sigma_kPa"; empty: the record itself.
+  [[nodiscard]] const std::string& member() const { return member_; }
+
+ private:
+  std::string member_;
+};
+
+/// The same fault, `name` before the member's own: "sigma_kPa", "[2]".
+inline MemberFault within(std::string_view name, const MemberFault& fault) {
+  const bool is_named = !fault.member().empty() && fault.member().front() != '[';
+  return MemberFault(fault.what(), fmt::format("{}{}{}", name, is_named ? "." : "", fault.member()));
+}
+
+/// Throws MemberFault with the value for one of another kind.
+inline void require_kind(bool is_so, const Json& json, const char* kind) {
+  constexpr size_t most_shown = 40;
+  if (is_so) return;
+  const std::string value = json.dump(-1, ' ', true);  // in ASCII, which may be cut anywhere
+  throw MemberFault(fmt::format("{}{} is no {}", value.substr(0, most_shown),
+                                value.size() > most_shown ? "..." : "", kind));
+}
+
+/// Throws MemberFault for what is missing or of another kind.
 template <class T>
 void read_json(const Json& json, T& value, MissingMembers missing = MissingMembers::refused);
 
 template <HasMembers T>
 void read_members(const Json& json, T& record, MissingMembers missing) {
-  if (!json.is_object()) throw std::invalid_argument("is no object");
+  require_kind(json.is_object(), json, "object");
   const auto read_member = [&](const char* name, auto&& member) {
     constexpr bool optional = requires { member.written_if_empty; };
-    if (!json.contains(name) && (optional || missing == MissingMembers::kept)) return;
+    const auto found = json.find(name);
+    if (found == json.end()) {
+      if (optional || missing == MissingMembers::kept) return;
+      throw MemberFault("is missing", name);
+    }
     try {
       if constexpr (optional) {
-        read_json(json.at(name), member.value, missing);
+        read_json(*found, member.value, missing);
       } else {
-        read_json(json.at(name), member, missing);
+        read_json(*found, member, missing);
       }
-    } catch (const nlohmann::json::exception& error) {
-      throw std::invalid_argument(fmt::format("key {}: {}", name, error.what()));
-    } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument(fmt::format("key {}: {}", name, error.what()));
+    } catch (const MemberFault& fault) {
+      throw within(name, fault);
     }
   };
   each_member(read_member, record);
@@ -193,45 +223,58 @@ void read_members(const Json& json, T& record, MissingMembers missing) {
 
 template <class List>
 void read_entries(const Json& json, List& entries, MissingMembers missing) {
-  if (!json.is_object()) throw std::invalid_argument("is no object");
+  require_kind(json.is_object(), json, "object");
   entries.clear();
   for (const auto& [key, of_key] : json.items()) {
     auto [name, value] = key_and_value(entries.emplace_back());
     name = key;
-    read_json(of_key, value, missing);
+    try {
+      read_json(of_key, value, missing);
+    } catch (const MemberFault& fault) {
+      throw within(key, fault);
+    }
   }
 }
 
 template <class T>
 void read_word(const Json& json, T& value) {
-  const auto word = json.get<std::string>();
+  const auto word = json.is_string() ? json.get<std::string>() : std::string();
   for (const T known : JsonWords<T>::all) {
     if (JsonWords<T>::word_of(known) == word) return void(value = known);
   }
-  throw std::invalid_argument(fmt::format("\"{}\" is no {}", word, JsonWords<T>::kind));
+  require_kind(false, json, JsonWords<T>::kind);
 }
 
 template <class Whole>
 void read_whole(const Json& json, Whole& value) {
-  if (!json.is_number_integer() || !std::in_range<Whole>(json.get<int64_t>()))
-    throw std::invalid_argument(json.dump() + " is no whole number in range");
+  require_kind(json.is_number_integer() && std::in_range<Whole>(json.get<int64_t>()), json,
+               "whole number in range");
   value = static_cast<Whole>(json.get<int64_t>());
+}
+
+/// Member by member, each with its place in the list.
+void read_each(const Json& json, auto& list, MissingMembers missing) {
+  for (size_t i = 0; i < json.size(); ++i) {
+    try {
+      read_json(json[i], list[i], missing);
+    } catch (const MemberFault& fault) {
+      throw within(fmt::format("[{}]", i), fault);
+    }
+  }
 }
 
 template <class T, size_t Count>
 void read_list(const Json& json, std::array<T, Count>& list, MissingMembers missing) {
-  if (!json.is_array() || json.size() != Count)
-    throw std::invalid_argument(fmt::format("is no list of {}", Count));
-  for (size_t i = 0; i < Count; ++i)
-    read_json(json[i], list[i], missing);
+  if (!json.is_array() || json.size() != Count) throw MemberFault(fmt::format("is no list of {}", Count));
+  read_each(json, list, missing);
 }
 
 template <class T>
 void read_list(const Json& json, std::vector<T>& list, MissingMembers missing) {
-  if (!json.is_array()) throw std::invalid_argument("is no list");
+  require_kind(json.is_array(), json, "list");
   list.clear();
-  for (const auto& member : json)
-    read_json(member, list.emplace_back(), missing);
+  list.resize(json.size());
+  read_each(json, list, missing);
 }
 
 template <class T>
@@ -245,12 +288,15 @@ void read_json(const Json& json, T& value, MissingMembers missing) {
   } else if constexpr (std::is_enum_v<T>) {
     read_word(json, value);
   } else if constexpr (std::is_floating_point_v<T>) {
+    require_kind(json.is_number() || json.is_null(), json, "number");
     value = json.is_null() ? std::numeric_limits<T>::quiet_NaN() : json.get<T>();
   } else if constexpr (std::is_same_v<T, bool>) {
+    require_kind(json.is_boolean(), json, "boolean");
     value = json.get<bool>();
   } else if constexpr (std::is_integral_v<T>) {
     read_whole(json, value);
   } else if constexpr (std::is_same_v<T, std::string>) {
+    require_kind(json.is_string() || json.is_null(), json, "text");
     value = json.is_null() ? "" : json.get<std::string>();
   } else if constexpr (std::ranges::range<T>) {
     read_list(json, value, missing);

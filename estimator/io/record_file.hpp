@@ -22,9 +22,12 @@ struct RecordFormat {
   [[nodiscard]] bool marks(std::string_view text) const;
   /// A record's document.
   [[nodiscard]] Json document(const Json& record) const;
-  /// `take` may throw nlohmann::json::exception and std::invalid_argument.
+  /// `take` may throw MemberFault, whose key then is the place, and std::invalid_argument.
   void read(std::string_view text, const std::string& file,
             const std::function<void(const Json&)>& take) const;
+
+ private:
+  void require_known_version(const Json& json, const std::string& file) const;
 };
 
 }  // namespace diastole

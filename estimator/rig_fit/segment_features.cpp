@@ -287,11 +287,6 @@ RunPrediction as_recorded(const SessionRun& run) {
 
 }  // namespace
 
-std::string_view name_of(Signal signal) {
-  constexpr std::array<std::string_view, signal_count> names{"cavity_kPa", "pump_kPa", "cavity_mL"};
-  return names[static_cast<size_t>(signal)];
-}
-
 SegmentFeatures::SegmentFeatures(const Session& session, const NoiseModel& noise, size_t threads) {
   for (size_t r = 0; r < session.runs.size(); ++r) {
     add_pressure_blocks(r, session.runs[r], blocks_);

@@ -13,8 +13,10 @@
 // where single cycles count, their variation.
 
 #include <Eigen/Dense>
+#include <array>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "estimator/rig_fit/noise_model.hpp"
@@ -23,7 +25,10 @@ namespace diastole::rig {
 
 enum class Signal : size_t { cavity, pump, volume };
 inline constexpr size_t signal_count = 3;
-std::string_view name_of(Signal signal);  ///< "cavity_kPa", "pump_kPa", "cavity_mL"
+constexpr std::string_view name_of(Signal signal) {
+  constexpr std::array<std::string_view, signal_count> names{"cavity_kPa", "pump_kPa", "cavity_mL"};
+  return names[static_cast<size_t>(signal)];
+}
 
 /// Beyond, no pressure of a stroke has anything but noise and ringing.
 inline constexpr double highest_feature_Hz = 12.0;

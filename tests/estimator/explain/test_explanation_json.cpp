@@ -96,7 +96,7 @@ TEST(ExplanationJson, NamesWhatIsWrong) {
   EXPECT_THAT(problem_of(R"({"verdict": "perhaps", "effects": [], "where": [], "gap": {}})"),
               HasSubstr("key verdict: \"perhaps\" is no verdict"));
   EXPECT_THAT(problem_of(R"({"verdict": "none", "effects": [], "where": [{"phase": [1]}], "gap": {}})"),
-              HasSubstr("key where: key phase"));
+              HasSubstr("key where[0].phase: "));
   EXPECT_THAT(problem_of(R"({"format_version": 99})"), HasSubstr("newer"));
   Explanation torn = test::explained_hose();
   torn.traces[0].after.pop_back();

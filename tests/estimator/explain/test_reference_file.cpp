@@ -1,8 +1,13 @@
-#include "estimator/explain/rig/reference_file.hpp"
+#include "estimator/explain/rig/reference_json.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include <functional>
+#include <nlohmann/json.hpp>
+
 #include "protocol/contract/input_error.hpp"
+#include "tests/estimator/io/scratch_file.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -63,16 +68,54 @@ TEST(Reference, OfAnotherRigIsRefusedWithBothHoses) {
   }
 }
 
+std::string refusal_of(const std::string& text) {
+  return test::message_of([&] { (void)reference_from_json(text, "rig.reference.json"); });
+}
+
 TEST(Reference, ThatIsNoneIsRefusedWithItsFile) {
-  for (const char* text :
-       {"", "{}", R"({"format": "diastole-reference", "format_version": 1, "channels": {}})"}) {
-    try {
-      (void)reference_from_json(text, "rig.reference.json");
-      ADD_FAILURE() << text;
-    } catch (const InputError& error) {
-      EXPECT_THAT(error.what(), testing::HasSubstr("rig.reference.json"));
-    }
+  EXPECT_THAT(refusal_of(""), testing::HasSubstr("rig.reference.json: line 1, column 1: is not a reference"));
+  EXPECT_THAT(refusal_of("{\n\"a\": }"), testing::HasSubstr("line 2, column 6: is not a reference"));
+  EXPECT_THAT(refusal_of("{}"), testing::HasSubstr("rig.reference.json: key format: is not"));
+}
+
+/// A reference's document that `spoil` has changed.
+std::string refusal_of_spoilt(const std::function<void(nlohmann::json&)>& spoil) {
+  Reference reference;
+  reference.tolerances = {"hose_length"};
+  reference.mean = Eigen::VectorXd::Constant(1, 0.5);
+  reference.covariance = Eigen::MatrixXd::Constant(1, 1, 0.25);
+  reference.segments["hold"] = {Eigen::Vector2d(1, 2), Eigen::Vector2d(1, 1)};
+  reference.rms = {0.012, 0.5, 0.0};
+  auto document = nlohmann::json::parse(to_json(reference));
+  spoil(document);
+  return refusal_of(document.dump());
+}
+
+TEST(Reference, ThatLacksSomethingIsRefusedWithItsPlaceInWordsOfOurs) {
+  using testing::HasSubstr;
+  for (const char* key :
+       {"format_version", "channels", "fingerprint", "sessions", "shares", "tolerances", "segments"}) {
+    const std::string refusal = refusal_of_spoilt([&](auto& document) { document.erase(key); });
+    EXPECT_THAT(refusal, HasSubstr(fmt::format("rig.reference.json: key {}: is missing", key)));
+    EXPECT_THAT(refusal, HasSubstr("diastole reference STUDY"));
+    EXPECT_THAT(refusal, testing::Not(HasSubstr("json.exception")));
   }
+  EXPECT_THAT(refusal_of_spoilt([](auto& document) { document["shares"].erase("again"); }),
+              HasSubstr("key shares.again: is missing"));
+  EXPECT_THAT(refusal_of_spoilt([](auto& document) {
+                document["shares"]["all"] = {1, 2};
+              }),
+              HasSubstr("key shares.all: is no list of 5"));
+  EXPECT_THAT(refusal_of_spoilt([](auto& document) { document["tolerances"]["names"] = {7}; }),
+              HasSubstr("key tolerances.names[0]: 7 is no text"));
+  EXPECT_THAT(refusal_of_spoilt([](auto& document) { document["tolerances"]["mean"][0] = nullptr; }),
+              HasSubstr("key tolerances.mean[0]: is no number"));
+  EXPECT_THAT(refusal_of_spoilt([](auto& document) { document["tolerances"]["covariance"] = {-1}; }),
+              HasSubstr("key tolerances.covariance: is no covariance"));
+  EXPECT_THAT(refusal_of_spoilt([](auto& document) { document["segments"]["hold"]["noise"] = {1}; }),
+              HasSubstr("key segments.hold: has 2 misfits and 1 noises"));
+  EXPECT_THAT(refusal_of_spoilt([](auto& document) { document["channels"]["cavity_kPa"].erase("rms_Pa"); }),
+              HasSubstr("key channels.cavity_kPa: has neither"));
 }
 
 }  // namespace
