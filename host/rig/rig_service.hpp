@@ -14,17 +14,14 @@
 #include <thread>
 #include <vector>
 
-#include "host/acquisition/live_trace.hpp"
 #include "host/calibration/calibration.hpp"
-#include "host/config/experiment.hpp"
 #include "host/controller/controller_client.hpp"
 #include "host/daq/instrument.hpp"
 #include "host/journal/journal.hpp"
 #include "host/rig/order_queue.hpp"
-#include "host/rig/run_monitor.hpp"
+#include "host/rig/rig.hpp"
 #include "host/rig/service_manager.hpp"
 #include "host/rig/session_so_far.hpp"
-#include "protocol/runfile/session.hpp"
 
 namespace diastole {
 
@@ -35,70 +32,33 @@ struct RigServiceOptions {
   ServiceManager* manager = nullptr;       ///< learns that the rig's thread is alive; outlives the service
 };
 
-/// Average the channels at rest and keep the result in the calibration file.
-struct CalibrationOrder {
-  std::vector<std::string> channels;  ///< empty: all
-  std::optional<double> kPa;          ///< the pressure that is applied; none: call this zero
-  double seconds = 5;
-  std::string operator_name;
-};
-
-struct RunOrder {
-  Experiment experiment;
-  bool prompts_answered = false;  ///< AcquisitionSetup::prompts_answered
-  bool resume = false;            ///< the last session of this experiment goes on with what is not done
-  runfile::Session session = {};  ///< a note without author or time is the operator's, of the run's start
-};
-
-struct SettingsChange {
-  bool defaults = false;  ///< begin with the initial ones
-  Attributes set;
-};
-
-class RigService {
+class RigService final : public Rig {
  public:
-  using Done = RigDone;
-
   /// Opens controller and instrument. Throws HardwareError if one is not there; a controller with a latched fault is:
   /// status shows it, and clear_fault leaves it.
   RigService(RigConfig rig, const RigServiceOptions& options);
   /// Ends a run by a controlled stop, writes what it has, and closes everything.
-  ~RigService();
+  ~RigService() override;
 
-  /// Loads and starts an experiment, or what is left of its last session. `done` is called with RunBegun when the controller has accepted it, or with
-  /// InputError when it cannot be done, HardwareError when it was stopped before the start.
-  void start_run(RunOrder order, Done done);
-  /// RigStatus, as the next two.
-  void home(Done done);
-  void clear_fault(Done done);
-  /// Relative, inflate positive; `done` when it is at rest again.
-  void jog(double distance_mL, double rate_mL_s, Done done);
-  /// SettingsReport. While the rig is occupied, as they were last read.
-  void settings(Done done);
-  /// `done` with what settings() then answers. The pump is unhomed afterwards.
-  void write_settings(SettingsChange change, Done done);
-  /// BlackBox. Throws RigBusy while the rig is occupied; does not occupy it.
-  void black_box(Done done);
-  /// SelfTestResult: the controller's measurements over loop-back wires, and the clocks compared for so long. HardwareError if
-  /// its motor is powered.
-  void self_test(double seconds, Done done);
-  /// CalibrationReport. HardwareError, and nothing changed, when samples are missing, or noise or drift is too high for
-  /// rest.
-  void calibrate(CalibrationOrder order, Done done);
-  /// RigStatus. While the rig is occupied the answer comes at once, from what the controller last reported.
-  void status(Done done);
-  /// Stops what moves or is about to; without anything, `false`.
-  bool stop(StopRequest how) { return queue_.stop(how); }
+  void start_run(RunOrder order, Done done) override;
+  void home(Done done) override;
+  void clear_fault(Done done) override;
+  void jog(double distance_mL, double rate_mL_s, Done done) override;
+  void settings(Done done) override;
+  void write_settings(SettingsChange change, Done done) override;
+  void black_box(Done done) override;
+  void self_test(double seconds, Done done) override;
+  void calibrate(CalibrationOrder order, Done done) override;
+  void status(Done done) override;
+  bool stop(StopRequest how) override { return queue_.stop(how); }
+  void note(const RunRemark& what) override;
+  [[nodiscard]] RunMonitor& run() override { return run_; }
+  [[nodiscard]] const LiveTrace& live() const override { return live_; }
+
   /// Stops now and takes no more orders; what is going on comes to its end. See idle().
   void end() { queue_.end(); }
   /// True when nothing is going on or waiting.
   [[nodiscard]] bool idle() const { return queue_.idle(); }
-  /// Writes to the log, and while a run is on to its events.
-  void note(const RunRemark& what);
-  /// The present or last run.
-  [[nodiscard]] RunMonitor& run() { return run_; }
-  /// Its newest pressure.
-  [[nodiscard]] const LiveTrace& live() const { return live_; }
 
  private:
   void work(const std::stop_token& stop);

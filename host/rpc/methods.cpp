@@ -44,15 +44,15 @@ RigDone to(Reply reply) {
   };
 }
 
-void rig_jog(RigService& rig, const json& params, const Reply& reply) {
+void rig_jog(Rig& rig, const json& params, const Reply& reply) {
   rig.jog(number_in(params, "mL"), number_in(params, "rate_mL_s"), to(reply));
 }
-void rig_write_settings(RigService& rig, const json& params, const Reply& reply) {
+void rig_write_settings(Rig& rig, const json& params, const Reply& reply) {
   rig.write_settings({params.value("defaults", false), settings_in(params.value("set", json::object()))},
                      to(reply));
 }
 
-void rig_self_test(RigService& rig, const json& params, const Reply& reply) {
+void rig_self_test(Rig& rig, const json& params, const Reply& reply) {
   const double seconds = params.contains("seconds") ? number_in(params, "seconds") : 10;
   if (!(seconds >= 2 && seconds <= 600))
     throw rpc::Error(rpc::Code::invalid_params, "seconds must be 2 to 600");
@@ -70,7 +70,7 @@ CalibrationOrder measurement_in(const json& params) {
   return order;
 }
 
-void rig_calibrate(RigService& rig, const json& params, const Reply& reply) {
+void rig_calibrate(Rig& rig, const json& params, const Reply& reply) {
   CalibrationOrder order = measurement_in(params);
   order.kPa = number_in(params, "kPa");
   if (order.channels.size() != 1)
@@ -106,7 +106,7 @@ runfile::Session session_in(const json& params) {
   return session;
 }
 
-void run_start(RigService& rig, const json& params, const Reply& reply) {
+void run_start(Rig& rig, const json& params, const Reply& reply) {
   const std::string text = params.at("experiment");
   if (text.size() > most_experiment_bytes) {
     throw rpc::Error(rpc::Code::invalid_params, "the experiment is too long");
@@ -121,12 +121,12 @@ void run_start(RigService& rig, const json& params, const Reply& reply) {
                 to(reply));
 }
 
-void run_trace(RigService& rig, const json& params, const Reply& reply) {
+void run_trace(Rig& rig, const json& params, const Reply& reply) {
   reply(nullptr, as_json(rig.live().since(params.value("run_id", ""), whole_in(params, "first_row"),
                                           whole_in(params, "first_trigger"))));
 }
 
-void run_stop(RigService& rig, const json& params, const Reply& reply) {
+void run_stop(Rig& rig, const json& params, const Reply& reply) {
   const std::string how = params.value("how", "now");
   if (how != "now" && how != "cycle_end" && how != "halt") {
     throw rpc::Error(rpc::Code::invalid_params, "how must be \"cycle_end\", \"now\" or \"halt\"");
@@ -138,35 +138,35 @@ void run_stop(RigService& rig, const json& params, const Reply& reply) {
 }
 
 /// Anybody's: it moves nothing, it only says which cycles are imaged, and the operator may sit at another terminal.
-void run_continue(RigService& rig, const json& params, const Reply& reply) {
+void run_continue(Rig& rig, const json& params, const Reply& reply) {
   std::optional<size_t> slice;
   if (params.contains("slice")) slice = whole_in(params, "slice");
   reply(nullptr, as_json(rig.run().go_on(slice)));
 }
 
 /// An order or a question that needs nothing but its name.
-template <void (RigService::*ask)(RigService::Done)>
-void plain(RigService& rig, const json&, const Reply& reply) {
+template <void (Rig::*ask)(Rig::Done)>
+void plain(Rig& rig, const json&, const Reply& reply) {
   (rig.*ask)(to(reply));
 }
 
 constexpr std::array all_methods{
-    Method{"rig.status", Access::anybody, plain<&RigService::status>},
-    Method{"rig.home", Access::controller, plain<&RigService::home>},
+    Method{"rig.status", Access::anybody, plain<&Rig::status>},
+    Method{"rig.home", Access::controller, plain<&Rig::home>},
     Method{"rig.zero", Access::controller,
-           [](RigService& rig, const json& params, const Reply& reply) {
+           [](Rig& rig, const json& params, const Reply& reply) {
              rig.calibrate(measurement_in(params), to(reply));
            }},
     Method{"rig.calibrate", Access::controller, rig_calibrate},
-    Method{"rig.clear_fault", Access::controller, plain<&RigService::clear_fault>},
+    Method{"rig.clear_fault", Access::controller, plain<&Rig::clear_fault>},
     Method{"rig.jog", Access::controller, rig_jog},
-    Method{"rig.settings", Access::anybody, plain<&RigService::settings>},
+    Method{"rig.settings", Access::anybody, plain<&Rig::settings>},
     Method{"rig.write_settings", Access::controller, rig_write_settings},
     Method{"rig.self_test", Access::controller, rig_self_test},
-    Method{"rig.black_box", Access::anybody, plain<&RigService::black_box>},
+    Method{"rig.black_box", Access::anybody, plain<&Rig::black_box>},
     Method{"run.start", Access::controller, run_start},
     Method{"run.progress", Access::anybody,
-           [](RigService& rig, const json& params, const Reply& reply) {
+           [](Rig& rig, const json& params, const Reply& reply) {
              reply(nullptr, as_json(rig.run().state(whole_in(params, "first_remark"))));
            }},
     Method{"run.trace", Access::anybody, run_trace},

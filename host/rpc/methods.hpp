@@ -7,7 +7,7 @@
 #include <span>
 #include <string_view>
 
-#include "host/rig/rig_service.hpp"
+#include "host/rig/rig.hpp"
 
 namespace diastole {
 
@@ -20,7 +20,7 @@ struct Method {
   std::string_view name;
   Access access;
   /// Calls `reply` once, now or later and on any thread; or throws rpc::Error, RigBusy, InputError or HardwareError.
-  void (*act)(RigService& rig, const nlohmann::json& params, const Reply& reply);
+  void (*act)(Rig& rig, const nlohmann::json& params, const Reply& reply);
 };
 
 std::span<const Method> methods();

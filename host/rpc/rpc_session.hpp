@@ -53,7 +53,7 @@ class QuietLog {
 /// What all clients share; used on the server's thread only.
 struct RpcState {
   boost::asio::io_context& context;
-  RigService& rig;
+  Rig& rig;
   ControlPolicy policy;
   ControlLease lease{};
   QuietLog log{};

@@ -2,21 +2,21 @@
 // The daemon's socket: JSON-RPC 2.0, one JSON object a line (json_rpc.hpp).
 //
 //   method          params                          who           result
-//   rig.status                                      anybody       RigService::status, and who controls the rig
-//   run.progress    {first_remark}                  anybody       RigService::run_progress
+//   rig.status                                      anybody       Rig::status, and who controls the rig
+//   run.progress    {first_remark}                  anybody       Rig::run
 //   run.stop        {how: "cycle_end"|"now"|"halt"} anybody       {stopping}
 //   run.start       {experiment, file, points, prompts_answered, resume}
 //                                                   controller    {run_id, journal, run_file}
 //   rig.home                                        controller    status
-//   rig.zero        {channels, seconds, operator}   controller    RigService::calibrate; no channels: all
+//   rig.zero        {channels, seconds, operator}   controller    Rig::calibrate; no channels: all
 //   rig.calibrate   {channels: [one], kPa, seconds, operator}
 //                                                   controller    the same
 //   rig.clear_fault                                 controller    status
 //   rig.jog         {mL, rate_mL_s}                 controller    status, and jogged_mL
-//   rig.self_test   {seconds}                       controller    {passed, checks}: RigService::self_test
-//   rig.settings                                    anybody       RigService::settings
-//   rig.write_settings {set: {name: value}, defaults} controller  RigService::settings
-//   rig.black_box                                   anybody       RigService::black_box
+//   rig.self_test   {seconds}                       controller    {passed, checks}: Rig::self_test
+//   rig.settings                                    anybody       Rig::settings
+//   rig.write_settings {set: {name: value}, defaults} controller  Rig::settings
+//   rig.black_box                                   anybody       Rig::black_box
 //   run.trace       {run_id, first_row, first_trigger}
 //                                                   anybody       {run_id, first_row, time_s, kPa, filtered_kPa,
 //                                                                  first_trigger, trigger_s}: columns, as

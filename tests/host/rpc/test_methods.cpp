@@ -1,0 +1,131 @@
+#include "host/rpc/methods.hpp"
+
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "host/rpc/json_rpc.hpp"
+#include "protocol/contract/json_text.hpp"
+#include "tests/host/bench/rig_on_paper.hpp"
+
+namespace diastole {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* experiment = R"(format = "diastole-experiment"
+version = 1
+[[segment]]
+waveform = "uploaded"
+points = "a.csv"
+stroke_mL = 20
+period_s = 0.8
+cycles = 4
+)";
+
+/// What each method takes.
+const std::map<std::string, json>& orders() {
+  static const std::map<std::string, json> all{
+      {"rig.status", json::object()},
+      {"rig.home", json::object()},
+      {"rig.zero", {{"channels", json::array({"cavity"})}, {"seconds", 5}, {"operator", "Jo"}}},
+      {"rig.calibrate",
+       {{"channels", json::array({"cavity"})}, {"kPa", 10}, {"seconds", 5}, {"operator", "Jo"}}},
+      {"rig.clear_fault", json::object()},
+      {"rig.jog", {{"mL", 5.0}, {"rate_mL_s", 1.0}}},
+      {"rig.settings", json::object()},
+      {"rig.write_settings", {{"set", {{"backlash_um", 40}, {"board_name", "MR1"}}}, {"defaults", true}}},
+      {"rig.self_test", {{"seconds", 10}}},
+      {"rig.black_box", json::object()},
+      {"run.start",
+       {{"experiment", experiment},
+        {"file", "e.toml"},
+        {"points", {{"a.csv", "phase,fraction\n0,0\n.5,1\n1,0\n"}}},
+        {"prompts_answered", true},
+        {"resume", false},
+        {"session",
+         {{"specimen", "gel"}, {"room_temperature_C", 21.5}, {"notes", json::array({"a note"})}}}}},
+      {"run.progress", {{"first_remark", 0}}},
+      {"run.trace", {{"run_id", "run-1"}, {"first_row", 0}, {"first_trigger", 0}}},
+      {"run.continue", {{"slice", 1}}},
+      {"run.stop", {{"how", "cycle_end"}}},
+  };
+  return all;
+}
+
+/// What a client that sends this reads: {"result"} or {"error"}.
+json answer_to(const Method& method, const json& sent) {
+  static const RigConfig config = read_rig(std::filesystem::path(DIASTOLE_SOURCE_DIR) / "examples/rig.toml");
+  const json params = json::parse(json_text(sent));
+  RigOnPaper rig(config);
+  int answers = 0;
+  std::string line;
+  try {
+    method.act(rig, params, [&](const std::exception_ptr& error, const json& result) {
+      ++answers;
+      line = error ? rpc::error_line(1, error) : rpc::result_line(1, result);
+    });
+    EXPECT_EQ(answers, 1) << method.name;
+  } catch (...) {
+    EXPECT_EQ(answers, 0) << method.name << " was answered and threw as well";
+    line = rpc::error_line(1, std::current_exception());
+  }
+  return json::parse(line);
+}
+
+TEST(Methods, EachCarriesOutItsOrder) {
+  for (const Method& method : methods()) {
+    ASSERT_TRUE(orders().contains(std::string(method.name))) << method.name;
+    const json answer = answer_to(method, orders().at(std::string(method.name)));
+    EXPECT_TRUE(answer.contains("result")) << method.name << ": " << answer.dump();
+  }
+  EXPECT_EQ(methods().size(), orders().size());
+}
+
+TEST(Methods, ParametersOfAnyKindAreTakenOrRefusedAsTheClientsFault) {
+  const std::vector<json> values{nullptr,
+                                 true,
+                                 -1,
+                                 1e300,
+                                 uint64_t{1} << 63U,
+                                 "",
+                                 "\xff",
+                                 json::array(),
+                                 json::object(),
+                                 json::array({1, json::object()})};
+  for (const Method& method : methods()) {
+    for (const auto& [name, usual] : orders().at(std::string(method.name)).items()) {
+      for (const json& value : values) {
+        json params = orders().at(std::string(method.name));
+        params[name] = value;
+        const json answer = answer_to(method, params);
+        if (answer.contains("result")) continue;
+        const auto code = static_cast<rpc::Code>(answer["error"]["code"].get<int>());
+        EXPECT_TRUE(code == rpc::Code::invalid_params || code == rpc::Code::input_fault)
+            << method.name << ", " << name << ": " << answer.dump();
+      }
+    }
+  }
+}
+
+TEST(Methods, NumbersThatNoOrderMayHaveAreRefused) {
+  const auto is_refused = [](const char* method, const char* name, const json& value) {
+    json params = orders().at(method);
+    params[name] = value;
+    return answer_to(*find_method(method), params).contains("error");
+  };
+  EXPECT_TRUE(is_refused("rig.jog", "rate_mL_s", 0));
+  EXPECT_TRUE(is_refused("rig.jog", "rate_mL_s", 1e300));
+  EXPECT_TRUE(is_refused("rig.self_test", "seconds", 1));
+  EXPECT_TRUE(is_refused("rig.self_test", "seconds", 1e9));
+  EXPECT_TRUE(is_refused("rig.zero", "seconds", -1));
+  EXPECT_TRUE(is_refused("rig.calibrate", "channels", json::array({"cavity", "pump"})));
+  EXPECT_TRUE(is_refused("rig.calibrate", "channels", json::array({"no such"})));
+  EXPECT_TRUE(is_refused("run.trace", "first_row", -1));
+  EXPECT_TRUE(is_refused("run.stop", "how", "at once"));
+}
+
+}  // namespace
+}  // namespace diastole
