@@ -633,12 +633,6 @@ class Sorter {
 
 }  // namespace
 
-fs::path beside(const fs::path& folder, std::string_view ending) {
-  fs::path whole = fs::absolute(folder).lexically_normal();
-  if (!whole.has_filename()) whole = whole.parent_path();
-  return whole.parent_path() / (whole.filename().string() + std::string(ending));
-}
-
 std::vector<fs::path> files_below(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error))

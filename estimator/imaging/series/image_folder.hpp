@@ -30,7 +30,11 @@ struct ImageFolder {
 std::vector<std::filesystem::path> files_below(const std::filesystem::path& folder);
 
 /// FOLDER with this ending, beside the folder: where what a person says about it stands unless another file is named.
-std::filesystem::path beside(const std::filesystem::path& folder, std::string_view ending);
+inline std::filesystem::path beside(const std::filesystem::path& folder, std::string_view ending) {
+  std::filesystem::path whole = std::filesystem::absolute(folder).lexically_normal();
+  if (!whole.has_filename()) whole = whole.parent_path();
+  return whole.parent_path() / (whole.filename().string() + std::string(ending));
+}
 
 using Progress = std::function<void(size_t done, size_t all)>;
 

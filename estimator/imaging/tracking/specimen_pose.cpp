@@ -244,7 +244,7 @@ SpecimenPose read_pose(const std::filesystem::path& file) {
   pose.axes << vector("x_axis"), vector("y_axis"), vector("z_axis");
   root.finish();
   const double off = (pose.axes.transpose() * pose.axes - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (off > 1e-3 || pose.axes.determinant() < 0)
+  if (!(off <= 1e-3 && pose.axes.determinant() > 0))
     throw InputError(
         {file.string(), "keys x_axis, y_axis, z_axis",
          fmt::format("are no right-handed axes of length 1 at right angles (off by {:.3g})", off),
