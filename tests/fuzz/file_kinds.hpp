@@ -28,6 +28,9 @@ enum class FileKind : unsigned char {
   guide,       ///< a table, or a GPFile
   bench_test,  ///< of tissue
   nifti,       ///< image, form feed, bval, form feed, bvec
+  edits,       ///< of tagged images, made by hand
+  pose,
+  reference,  ///< of a rig
   count
 };
 

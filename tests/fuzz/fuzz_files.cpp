@@ -4,18 +4,23 @@
 //   input: one byte that says what the file is (its number in file_kinds.hpp), then the file
 
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "estimator/effect_files/effect_file.hpp"
+#include "estimator/explain/rig/reference_json.hpp"
 #include "estimator/grids/gmsh_file.hpp"
 #include "estimator/grids/vtu_file.hpp"
 #include "estimator/grids/xdmf_file.hpp"
 #include "estimator/imaging/diffusion/nifti_series.hpp"
 #include "estimator/imaging/geometry/guide_points.hpp"
+#include "estimator/imaging/tracking/manual_edits.hpp"
+#include "estimator/imaging/tracking/specimen_pose.hpp"
 #include "estimator/io/fibre_points.hpp"
 #include "estimator/io/fit_file.hpp"
 #include "estimator/io/flow_file.hpp"
@@ -47,6 +52,21 @@ std::filesystem::path as_file(std::string_view text, const char* name) {
   const std::filesystem::path file = scratch / name;
   std::ofstream(file, std::ios::binary | std::ios::trunc) << text;
   return file;
+}
+
+/// Of two slices, one with a grid of tags, in two phases each.
+std::vector<imaging::TagView> tag_views() {
+  imaging::TagView view;
+  view.plane.rows = 12;
+  view.plane.columns = 16;
+  view.images.resize(2);
+  view.frames = {1, 2};
+  view.waves = {{.per_mm = {0.2, 0.0}, .offset_cycles = 0.5, .modulation = 1.0, .prominence = 100.0}};
+  view.name = "series 2, slice 1";
+  imaging::TagView grid = view;
+  grid.waves.push_back({.per_mm = {0.0, 0.2}, .offset_cycles = 0.0, .modulation = 1.0, .prominence = 100.0});
+  grid.name = "series 2, slice 2";
+  return {view, grid};
 }
 
 void read(fuzz::FileKind kind, std::string_view text) {
@@ -118,6 +138,17 @@ void read(fuzz::FileKind kind, std::string_view text) {
                                         as_file(text.substr(middle + 1, last - middle - 1), "a.bval"),
                                         as_file(text.substr(last + 1), "a.bvec")});
     }
+    case edits: {
+      std::vector<imaging::TagView> views = tag_views();
+      return imaging::apply_edits(imaging::parse_edits(text, "edits"), views);
+    }
+    case pose: {
+      const Eigen::Matrix3d axes = imaging::read_pose(as_file(text, "a.pose.toml")).axes;
+      if (!(axes.transpose() * axes).isIdentity(1e-2)) std::abort();
+      return;
+    }
+    case reference:
+      return (void)explain::reference_from_json(text, "reference");
     case count:
       return;
   }

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <string>
 
+#include "estimator/explain/rig/reference_json.hpp"
 #include "estimator/io/fibre_points.hpp"
 #include "estimator/io/fit_file.hpp"
 #include "estimator/io/flow_file.hpp"
@@ -101,17 +102,54 @@ void write_sessions(const std::filesystem::path& directory) {
   write(directory / "fuzz_client" / "session", client.bytes());
 }
 
-/// One line of each kind on the daemon's socket.
+/// One line of each kind on the daemon's socket, and what its clients ask.
 void write_rpc_lines(const std::filesystem::path& directory) {
-  const auto line = [&directory](const char* name, const std::string& text) {
+  using nlohmann::json;
+  const auto line = [&directory](const std::string& name, const std::string& text) {
     write(directory / "fuzz_rpc" / name, {text.begin(), text.end()});
   };
-  line("request", R"({"jsonrpc":"2.0","id":1,"method":"rig.jog","params":{"mL":5.0,"rate_mL_s":1.0}})");
   line("result", R"({"jsonrpc":"2.0","id":1,"result":{"state":"idle"}})");
   line("input_fault", R"({"jsonrpc":"2.0","id":1,"error":{"code":-32001,"message":"m",)"
                       R"("data":{"file":"f","place":"p","problem":"b","remedy":"r"}}})");
   line("hardware_fault",
        R"({"jsonrpc":"2.0","id":1,"error":{"code":-32002,"message":"rig: is away\n  Find it."}})");
+  const auto request = [](const char* method, const json& params = json::object()) {
+    return json{{"jsonrpc", "2.0"}, {"id", 1}, {"method", method}, {"params", params}}.dump() + "\n";
+  };
+  const std::string experiment =
+      "format = \"diastole-experiment\"\nversion = 1\n[[segment]]\nwaveform = \"uploaded\"\n"
+      "points = \"a.csv\"\nstroke_mL = 20\nperiod_s = 0.8\ncycles = 4\n";
+  const json facts{
+      {"specimen", "gel"}, {"operator", "Jo"}, {"room_temperature_C", 21.5}, {"notes", {"a note"}}};
+  const std::vector<std::pair<const char*, json>> requests{
+      {"rig.status", json::object()},
+      {"rig.home", json::object()},
+      {"rig.zero", {{"channels", {"cavity"}}, {"seconds", 5}, {"operator", "Jo"}}},
+      {"rig.calibrate", {{"channels", {"cavity"}}, {"kPa", 10}, {"seconds", 5}, {"operator", "Jo"}}},
+      {"rig.clear_fault", json::object()},
+      {"rig.jog", {{"mL", 5.0}, {"rate_mL_s", 1.0}}},
+      {"rig.settings", json::object()},
+      {"rig.write_settings", {{"set", {{"backlash_um", 40}, {"board_name", "MR1"}}}, {"defaults", true}}},
+      {"rig.self_test", {{"seconds", 10}}},
+      {"rig.black_box", json::object()},
+      {"run.start",
+       {{"experiment", experiment},
+        {"file", "e.toml"},
+        {"points", {{"a.csv", "phase,fraction\n0,0\n.5,1\n1,0\n"}}},
+        {"prompts_answered", true},
+        {"resume", false},
+        {"session", facts}}},
+      {"run.progress", {{"first_remark", 0}}},
+      {"run.trace", {{"run_id", "run-1"}, {"first_row", 0}, {"first_trigger", 0}}},
+      {"run.continue", {{"slice", 1}}},
+      {"run.stop", {{"how", "cycle_end"}}},
+  };
+  for (const auto& [method, params] : requests)
+    line(method, request(method, params));
+  line("control", request("rig.home") + "\1" + request("console.sign_in", {{"name", "Ann"}}) + "\1" +
+                      request("control.take") + "\1" + request("control.take", {{"take_over", "operator"}}) +
+                      "\2" + request("rig.home") + request("console.address") + "\1" +
+                      request("control.release"));
 }
 
 /// Requests as fuzz_console reads them, and a message behind the one that is let in.
@@ -225,6 +263,18 @@ std::string nifti_seed() {
   return header + std::string(4 * 2 * 2 * 2 * 3, 'A') + "\f0 1000 1000\n\f0 1 0\n0 0 1\n0 0 0\n";
 }
 
+std::string reference_seed() {
+  explain::Reference reference;
+  reference.tolerances = {"hose_length", "hose_bore"};
+  reference.mean = Eigen::Vector2d(0.5, -1.0);
+  reference.covariance = Eigen::Matrix2d{{0.25, 0.1}, {0.1, 0.5}};
+  reference.segments["hold"] = {Eigen::Vector3d(1, 2, 3), Eigen::Vector3d(1, 1, 1)};
+  reference.rms = {0.012, 0.5, 0.02};
+  reference.hose_length_m = 4.7;
+  reference.sessions = 1;
+  return to_json(reference);
+}
+
 /// The examples, documents of records with one of everything, and grids of one cell.
 void write_files(const std::filesystem::path& directory) {
   using enum fuzz::FileKind;
@@ -312,6 +362,18 @@ Element: 1 0 0
 )");
   write_file(directory, guide, "x y z contour-type sliceID weight frame\n1 2 3 SAX_LV_ENDOCARDIAL 3 1 0\n");
   write_file(directory, nifti, nifti_seed());
+  write_file(
+      directory, edits,
+      R"({"slice": "series 2, slice 2", "direction": 1, "phase": 1, "action": "line", "tag": 2, "points": [[9, 2], [9, 8]]}
+{"slice": "series 2, slice 1", "phase": "all", "action": "mask", "points": [[1, 1], [4, 1], [4, 5]]}
+{"slice": "series 2, slice 1", "phase": 2, "action": "contour", "contour": "inner", "points": [[3, 3], [9, 3], [9, 8]]}
+{"slice": "series 2, slice 1", "action": "height", "height_mm": 5}
+{"action": "undo", "line": 2}
+)");
+  write_file(directory, pose,
+             "kind = \"annulus\"\norigin_mm = [1, 2, 3]\nx_axis = [1, 0, 0]\ny_axis = [0, 1, 0]\n"
+             "z_axis = [0, 0, 1]\n");
+  write_file(directory, reference, reference_seed());
   const Bytes image = flash_test::make_update_file({});
   write_file(directory, update, {reinterpret_cast<const char*>(image.data()), image.size()});
   const std::filesystem::path key_file = directory / "seed-key.pem";
