@@ -1,4 +1,4 @@
-"""Run files: HDF5, read with h5py; and the catalogue over them."""
+"""Run files, and the catalogue over them."""
 
 from __future__ import annotations
 
@@ -7,19 +7,13 @@ import pathlib
 from dataclasses import dataclass
 from typing import Any, Union
 
-import h5py  # type: ignore[import]
 import numpy as np
-import numpy.typing as npt
 
 from diastole import results
 from diastole.program import call, options
+from diastole.run_file import Column, RunFile
 
 Path = Union[str, "os.PathLike[str]"]
-Column = npt.NDArray[np.float64]
-
-
-def _text(value: Any) -> str:
-    return value.decode() if isinstance(value, bytes) else str(value)
 
 
 @dataclass(frozen=True)
@@ -32,31 +26,27 @@ class Note:
 
 
 class Run:
-    """One run file (docs/run-file.md). Columns are read when they are asked for; missing samples are NaN."""
+    """One run file (docs/run-file.md); ValueError if it claims what it has not. Columns are read when asked for; missing samples are NaN."""
 
     def __init__(self, path: Path) -> None:
         self.path = pathlib.Path(path)
-        with h5py.File(self.path, "r") as file:
-            if _text(file.attrs.get("format", "")) != "diastole-run":
+        with RunFile(self.path) as file:
+            root = file.attributes("/")
+            if root.get("format") != "diastole-run":
                 raise ValueError(f"{self.path}: is no run file of Diastole")
-            self.run_id, self.started_utc, self.producer = (_text(file.attrs[n]) for n in ("run_id", "started_utc", "producer"))
-            self.rig: dict[str, Any] = self._attributes(file["rig"])
-            self.session: dict[str, Any] = self._attributes(file["session"]) if "session" in file else {}
-            self.notes = [Note(_text(n.attrs["written_utc"]), _text(n.attrs["author"]), _text(n[()]))
-                          for n in (file["session/notes"].values() if "session/notes" in file else ())]
-            self.experiment = _text(file["protocol/toml"][()])
-            self.segments = [{name: _text(row[name]) if isinstance(row[name], bytes) else row[name].item() for name in row.dtype.names}
-                             for row in file["protocol/segments"][:]]
-            self.channels = sorted(name for name in file["pressure"] if name.endswith("_kPa"))
-
-    @staticmethod
-    def _attributes(group: Any) -> dict[str, Any]:
-        return {name: _text(v) if isinstance(v, (bytes, str)) else v.item() for name, v in group.attrs.items()}
+            self.run_id, self.started_utc, self.producer = (str(root.get(name, "")) for name in ("run_id", "started_utc", "producer"))
+            self.rig: dict[str, Any] = file.attributes("rig")
+            self.session: dict[str, Any] = file.attributes("session")
+            notes = [f"session/notes/{number}" for number in file.names("session/notes")]
+            self.notes = [Note(file.attributes(n).get("written_utc", ""), file.attributes(n).get("author", ""), file.text(n)) for n in notes]
+            self.experiment = file.text("protocol/toml")
+            self.segments = file.table("protocol/segments")
+            self.channels = [name for name in file.names("pressure") if name.endswith("_kPa")]
 
     def column(self, dataset: str) -> Column:
         """Any dataset of numbers, by its path: "pump/commanded_mL"."""
-        with h5py.File(self.path, "r") as file:
-            return np.asarray(file[dataset][:], dtype=np.float64)
+        with RunFile(self.path) as file:
+            return file.numbers(dataset)
 
     @property
     def time_s(self) -> Column:

@@ -16,6 +16,7 @@ import numpy as np
 
 MOST_MEMORY = 600 << 20  # of address space: program, libraries and what a run of seconds needs
 HUGE = 100_000_000
+MEGABYTE = "x" * (1 << 20)
 
 
 def external_link(run, place):
@@ -35,6 +36,12 @@ def external_group(run, place):
 
 def user_defined_link(run, place):
     """A link of a class that nobody has registered; the library's own number for an external one is overwritten."""
+    run.create_group("more")["zz"] = h5py.ExternalLink("name-to-be-found-again.h5", "/x")  # of few links, which bear no checksum
+    return "link /more/zz"
+
+
+def damaged_group(run, place):
+    """As the last, among many links, whose checksum then is wrong."""
     run["zz"] = h5py.ExternalLink("name-to-be-found-again.h5", "/x")
     return "groups that cannot be read"
 
@@ -93,23 +100,30 @@ def table_that_is_not_there(run, place):
     return "dataset /events"
 
 
-def one_text_many_times(run, place):
-    """Variable-length texts that all point at the same megabyte."""
-    del run["gaps"]
+def of_one_text(run, table, first_row):
+    """A table of many rows; after() makes each the first, so that their variable-length texts are the same megabyte."""
     texts = h5py.string_dtype()
-    rows = 4000
-    data = run.create_dataset("gaps", (rows,), [("stream", texts), ("first_index", "i8"), ("count", "i8"), ("reason", texts)])
-    big = "x" * (1 << 20)
-    data[0] = (big, 0, 1, big)
+    row = [(name, texts if isinstance(value, str) else type(value)) for name, value in first_row.items()]
+    del run[table]
+    data = run.create_dataset(table, (4000,), row)
+    data[0] = tuple(first_row.values())
     run.flush()
+
+
+def one_text_many_times(run, place):
+    of_one_text(run, "gaps", {"stream": MEGABYTE, "first_index": 0, "count": 1, "reason": MEGABYTE})
     return "dataset /gaps"
+
+
+def one_waveform_many_times(run, place):
+    of_one_text(run, "protocol/segments", {"start_s": 0.0, "waveform": MEGABYTE, "stroke_mL": 1.0, "period_s": 1.0, "offset_mL": 0.0, "cycles": 1})
+    return "has texts of more than"
 
 
 def text_of_a_fixed_length(run, place):
     del run["protocol/toml"]
     run.create_dataset("protocol/toml", (), "S268000000")
     return "dataset /protocol/toml"
-
 
 
 def set_of_numbers_in_two_dimensions(run, place):
@@ -127,16 +141,16 @@ def a_type_of_its_own(run, place):
 def after(file, tampered):
     """What h5py itself cannot write, put into the finished file's bytes."""
     content = file.read_bytes()
-    if tampered is user_defined_link:
+    if tampered in (user_defined_link, damaged_group):
         # In a link message the link's class stands before its character set and its name: an external one's is 64; 200 is free.
         name = content.rfind(b"zz", 0, content.find(b"name-to-be-found-again.h5"))
         kind = content.rfind(b"\x40", name - 4, name)
         if name < 0 or kind < 0:
             return False
         content = content[:kind] + bytes([200]) + content[kind + 1:]
-    if tampered is one_text_many_times:
+    if tampered in (one_text_many_times, one_waveform_many_times):
         with h5py.File(file, "r") as run:
-            data = run["gaps"]
+            data = run["gaps" if tampered is one_text_many_times else "protocol/segments"]
             begin, bytes_all, rows = data.id.get_offset(), data.id.get_storage_size(), data.shape[0]
         one = content[begin:begin + bytes_all // rows]
         content = content[:begin] + one * rows + content[begin + bytes_all:]
@@ -144,8 +158,9 @@ def after(file, tampered):
     return True
 
 
-HOSTILE = [external_link, external_group, user_defined_link, external_storage, virtual_dataset, rows_that_are_not_there,
-           chunks_that_are_not_there, one_chunk_that_unpacks_to_much, more_triggers_than_any_recording_has, table_that_is_not_there, one_text_many_times, text_of_a_fixed_length,
+HOSTILE = [external_link, external_group, user_defined_link, damaged_group, external_storage, virtual_dataset, rows_that_are_not_there,
+           chunks_that_are_not_there, one_chunk_that_unpacks_to_much, more_triggers_than_any_recording_has, table_that_is_not_there, one_text_many_times,
+           one_waveform_many_times, text_of_a_fixed_length,
            set_of_numbers_in_two_dimensions, a_type_of_its_own]
 
 
@@ -187,4 +202,5 @@ def main():
         shutil.rmtree(place)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -5,6 +5,7 @@ import json
 import math
 import os
 import pathlib
+import shutil
 import signal
 import subprocess
 import sys
@@ -15,11 +16,13 @@ import unittest.mock
 
 source, programs = pathlib.Path(sys.argv.pop(1)).resolve(), pathlib.Path(sys.argv.pop(1)).resolve()
 os.environ["DIASTOLE"] = str(programs / "diastole")
-sys.path.insert(0, str(source / "python"))
+sys.path[:0] = [str(source / "python"), str(source / "tests/flow")]
 
 import diastole  # noqa: E402
 import diastole.classes  # noqa: E402
 import diastole.rig  # noqa: E402
+import h5py  # noqa: E402
+import hostile_run_files  # noqa: E402
 
 from diastole.record import Record  # noqa: E402
 
@@ -71,6 +74,43 @@ class Runs(InAFolder):
             diastole.simulate(self.folder / "missing.toml", self.folder / "a.run.h5")
         self.assertEqual(refused.exception.code, 2)
         self.assertIn("missing.toml", str(refused.exception))
+
+
+class HostileFiles(InAFolder):
+    """Those that the program refuses, read in as little memory as numpy leaves."""
+
+    READ_ALL = "import sys, diastole; run = diastole.Run(sys.argv[1]); run.time_s, run.cavity_kPa, run.trigger_s, run.volume_mL()"
+
+    def read(self, file):
+        bounded = {**os.environ, "PYTHONPATH": str(source / "python"), "OPENBLAS_NUM_THREADS": "1"}
+        return subprocess.run([sys.executable, "-B", "-c", self.READ_ALL, file], env=bounded, capture_output=True, text=True, timeout=60,
+                              preexec_fn=hostile_run_files.limited)
+
+    def test_are_refused_with_their_place_before_memory_is_taken(self):
+        sound = diastole.simulate(self.folder / "e.toml", self.folder / "sound.run.h5").path
+        self.assertEqual(self.read(sound).stderr, "")
+        unread = (hostile_run_files.one_text_many_times,)  # a table that the package does not read
+        for tampered in (each for each in hostile_run_files.HOSTILE if each not in unread):
+            with self.subTest(tampered.__name__):
+                file = self.folder / "hostile.run.h5"
+                shutil.copy(sound, file)
+                with h5py.File(file, "r+") as run:
+                    expected = tampered(run, self.folder)
+                self.assertTrue(hostile_run_files.after(file, tampered))
+                refused = self.read(file).stderr.splitlines()
+                said = [line for line in refused if line.startswith("ValueError: ")]
+                self.assertTrue(said and expected in said[0] and str(file) in said[0], refused[-3:])
+
+    def test_what_only_a_plug_in_unpacks_is_refused_unread(self):
+        file = diastole.simulate(self.folder / "e.toml", self.folder / "a.run.h5").path
+        with h5py.File(file, "r+") as run:
+            del run["pump/commanded_mL"]
+            created = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+            created.set_chunk((10,))
+            created.set_filter(32001, h5py.h5z.FLAG_OPTIONAL)  # blosc's number
+            h5py.h5d.create(run["pump"].id, b"commanded_mL", h5py.h5t.NATIVE_DOUBLE, h5py.h5s.create_simple((10,)), created)
+        with self.assertRaisesRegex(ValueError, "dataset /pump/commanded_mL: is packed in a way that only a plug-in knows"):
+            diastole.Run(file)
 
 
 class Studies(InAFolder):
