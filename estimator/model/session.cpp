@@ -89,7 +89,7 @@ SessionRun session_run(RecordedRun&& run, const std::string& name) {
           {segment.start_s, segment.period_s, static_cast<size_t>(segment.cycles)});
   for (const Channel channel : {Channel::cavity, Channel::pump}) {
     const auto samples = run.pressure.channels.find(name_of(channel));
-    if (samples != run.pressure.channels.end()) read.pressure_kPa[channel] = samples->second;
+    if (samples != run.pressure.channels.end()) read.pressure_kPa[channel] = std::move(samples->second);
   }
   read.sample_s = std::move(run.pressure.time_s);
   return read;

@@ -46,7 +46,7 @@ class H5Source {
       fail("", "is not an HDF5 file", "Give a run file (NAME.run.h5).");
     }
     H5PLset_loading_state(0);  // filters and links that only a plug-in knows are not for run files
-    file_ = FileHandle(H5Fopen(name_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
+    file_ = FileHandle(H5Fopen(name_.c_str(), H5F_ACC_RDONLY, with_small_cache().get()));
     if (!file_.valid()) {
       fail("", "is an HDF5 file that cannot be read",
            "It is truncated or still being written; if its journal exists, use `diastole recover`.");
@@ -276,6 +276,23 @@ class H5Source {
   static herr_t collect_attribute(hid_t, const char* name, const H5A_info_t*, void* names) {
     static_cast<std::vector<std::string>*>(names)->emplace_back(name);
     return 0;
+  }
+
+  /// The library would keep megabytes of the index of an hour's chunks, which are read one after the other, and each once.
+  static PropertyHandle with_small_cache() {
+    constexpr size_t cache_bytes = size_t{128}
+                                   << 10;  // nodes of a dozen datasets' indices, read side by side
+    PropertyHandle access(H5Pcreate(H5P_FILE_ACCESS));
+    H5AC_cache_config_t cache{};
+    cache.version = H5AC__CURR_CACHE_CONFIG_VERSION;
+    H5Pget_mdc_config(access.get(), &cache);
+    cache.set_initial_size = true;
+    cache.initial_size = cache.min_size = cache.max_size = cache_bytes;
+    cache.incr_mode = H5C_incr__off;
+    cache.flash_incr_mode = H5C_flash_incr__off;
+    cache.decr_mode = H5C_decr__off;
+    H5Pset_mdc_config(access.get(), &cache);
+    return access;
   }
 
   /// Hard and soft links only: an external one, or one of a class of its own, leads to what another file or a plug-in says.
