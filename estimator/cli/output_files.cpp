@@ -25,8 +25,8 @@ void OutputFiles::require(const std::vector<std::filesystem::path>& inputs, std:
 
 void print_findings(const std::vector<Finding>& findings, std::FILE* stream) {
   for (const Finding& finding : findings) {
-    fmt::print(stream, "{}: {} [{}]\n  {}\n", describe(finding.severity), finding.what, finding.where,
-               finding.remedy);
+    const std::string place = finding.where.empty() ? "" : fmt::format(" [{}]", finding.where);
+    fmt::print(stream, "{}: {}{}\n  {}\n", describe(finding.severity), finding.what, place, finding.remedy);
   }
 }
 

@@ -128,7 +128,9 @@ void add_elements(Page& page, const ReconstructionRecord& record) {
 
 void add_findings(Page& page, const std::vector<Finding>& findings) {
   for (const Finding& finding : findings) {
-    const std::string text = fmt::format("{} {} ({})", finding.what, finding.remedy, finding.where);
+    const bool ends = finding.what.ends_with('.') || finding.what.ends_with('?');
+    const std::string text = fmt::format("{}{}{}{} {}", finding.where, finding.where.empty() ? "" : ": ",
+                                         finding.what, ends ? "" : ".", finding.remedy);
     if (finding.severity == Severity::note) {
       page.paragraph(text);
     } else {

@@ -6,8 +6,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <optional>
+#include <string_view>
+#include <utility>
 
 #include "estimator/imaging/geometry/base_points.hpp"
 #include "estimator/imaging/geometry/phased_fit.hpp"
@@ -376,17 +379,34 @@ bool has_reference(const std::vector<GuideSlice>& slices, const std::vector<bool
   return false;
 }
 
+/// One finding for each wall in a slice: what is wrong there is so in phase after phase.
 void add_wild_points(VentricleFit& fit, const GuidePoints& guide, const WallFit& walls) {
+  struct Wild {
+    size_t points = 0, phase = 0;
+    double farthest_mm = 0;
+  };
+  std::map<std::pair<size_t, GuideSurface>, Wild> found;  // by slice and wall
   for (const GuidePoint& point : guide.points) {
     if (point.surface == GuideSurface::base) continue;
     const Misfit m = walls.misfit_of(point);
     if (std::abs(m.distance_mm) <= wild_sigmas * walls.sigma_mm(point, m) * fit.noise_factor) continue;
+    Wild& wild = found[{point.slice, point.surface}];
+    ++wild.points;
+    if (std::abs(m.distance_mm) <= std::abs(wild.farthest_mm)) continue;
+    wild.farthest_mm = m.distance_mm;
+    wild.phase = point.phase;
+  }
+  for (const auto& [place, wild] : found) {
+    const auto& [slice, surface] = place;
+    const std::string_view wall = name_of(surface);
     fit.findings.push_back(
         {Severity::warning, "wild-point",
-         fmt::format("a point of the {} lies {:.1f} mm beside its wall", name_of(point.surface),
-                     m.distance_mm),
-         fmt::format("phase {}, slice {}", guide.phases[point.phase], guide.slices[point.slice]),
-         m.distance_mm, "mm", "Look at the image there; it pulls no more than one three sigmas off."});
+         wild.points == 1
+             ? fmt::format("a point of the {} lies {:.1f} mm beside its wall", wall, wild.farthest_mm)
+             : fmt::format("{} points of the {} lie beside their wall, the farthest by {:.1f} mm",
+                           wild.points, wall, wild.farthest_mm),
+         fmt::format("phase {}, slice {}", guide.phases[wild.phase], guide.slices[slice]), wild.farthest_mm,
+         "mm", "Look at the image there; none pulls more than one three sigmas off."});
   }
 }
 

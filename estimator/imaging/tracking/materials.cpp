@@ -16,6 +16,9 @@ constexpr double least_share = 0.1;
 
 /// Water that is stirred loses its tags within a phase or two, tissue keeps them for its T1 of 0.3 to 1.5 s, still water for 2 s and more.
 constexpr std::array typical_T1_s = {0.1, 0.8, 3.0};
+/// What fades in less is tissue all the same: beside air there is no still water, and the slower half of the wall is no other material. Tissue
+/// reads 0.6 to 0.95 s, still water between tissue and plates 1.3 s and more.
+constexpr double least_water_T1_s = 1.1;
 /// Darker than a quarter of what is bright: plates, air, and the noise of both.
 constexpr double least_brightness = 0.25;
 /// A pixel that no material explains (a ghost, a fold) should not outvote its neighbours: 3 standard deviations.
@@ -108,6 +111,68 @@ std::array<Fading, 3> grouped(const std::vector<Fading>& samples, const std::vec
     }
   }
   return centres;
+}
+
+/// The course of a group's median sample: the few at its boundaries do not count.
+Fading median_course(const std::array<Fading, 3>& centres, size_t group, const std::vector<Fading>& samples) {
+  std::vector<std::vector<double>> values(centres[group].size());
+  for (const Fading& sample : samples) {
+    if (nearest(centres, sample) != group) continue;
+    for (size_t k = 0; k < sample.size(); ++k)
+      values[k].push_back(sample[k]);
+  }
+  if (values[0].empty()) return centres[group];
+  Fading course;
+  for (std::vector<double>& each : values)
+    course.push_back(signal::quantile(each, 0.5));
+  return course;
+}
+
+/// T1 by the slope of the logarithm; each phase has the same noise, hence weights E^2. Infinite where nothing fades.
+double T1_of(const Fading& course, const std::vector<double>& times_s) {
+  double weights = 0, time = 0, level = 0;
+  for (size_t k = 0; k < course.size(); ++k) {
+    const double weight = course[k] * course[k];
+    weights += weight;
+    time += weight * times_s[k];
+    level += weight * std::log(std::max(course[k], 1e-3));
+  }
+  double square = 0, product = 0;
+  for (size_t k = 0; k < course.size(); ++k) {
+    const double off_s = times_s[k] - time / weights;
+    square += course[k] * course[k] * off_s * off_s;
+    product += course[k] * course[k] * off_s * (std::log(std::max(course[k], 1e-3)) - level / weights);
+  }
+  return product < 0 ? -square / product : std::numeric_limits<double>::infinity();
+}
+
+/// Nodes of the raster, column by row, that hold a material. The windowed mean reaches beyond an edge to nothing, where it has half of what is
+/// beside it; away from such an edge a dark material may lie beside a bright one.
+std::vector<bool> materials_there(const std::vector<double>& mean, size_t nodes_a_row,
+                                  double reach_in_nodes) {
+  const double bright = signal::quantile(mean, 0.9);
+  const auto rows = static_cast<Eigen::Index>(mean.size() / nodes_a_row);
+  const auto columns = static_cast<Eigen::Index>(nodes_a_row);
+  const auto reach = static_cast<Eigen::Index>(reach_in_nodes);
+  std::vector<bool> there(mean.size());
+  for (Eigen::Index row = 0; row < rows; ++row) {
+    for (Eigen::Index column = 0; column < columns; ++column) {
+      double darkest = std::numeric_limits<double>::infinity(), brightest = 0;
+      for (Eigen::Index r = std::max<Eigen::Index>(0, row - reach); r <= std::min(rows - 1, row + reach);
+           ++r) {
+        for (Eigen::Index c = std::max<Eigen::Index>(0, column - reach);
+             c <= std::min(columns - 1, column + reach); ++c) {
+          const double value = mean[static_cast<size_t>(r * columns + c)];
+          darkest = std::min(darkest, value);
+          brightest = std::max(brightest, value);
+        }
+      }
+      const auto at = static_cast<size_t>(row * columns + column);
+      const bool is_at_nothing = darkest < least_brightness * bright;
+      there[at] = mean[at] >= least_brightness * bright && !(is_at_nothing && mean[at] < 0.5 * brightest);
+    }
+  }
+  return there;
 }
 
 using CostMap = Eigen::ArrayXXf;
@@ -314,18 +379,23 @@ MaterialMap first_materials(const TagView& view) {
     times_s.push_back(1e-3 * view.times_ms[k]);
   }
   const size_t nodes = modulations[0].mean.size();
-  const double bright = signal::quantile(modulations.back().mean, 0.9);
+  const auto nodes_a_row = static_cast<size_t>((view.plane.columns + raster - 1) / raster);
+  const double spacing_mm = view.waves[0].spacing_mm();
+  const double reach = spacing_mm / (static_cast<double>(raster) * view.plane.finer_spacing_mm());
+  const std::vector<bool> first_there = materials_there(modulations.front().mean, nodes_a_row, reach);
+  const std::vector<bool> last_there = materials_there(modulations.back().mean, nodes_a_row, reach);
   std::vector<Fading> fading(nodes), samples;
   for (size_t node = 0; node < nodes; ++node) {
-    if (modulations.back().mean[node] < least_brightness * bright) continue;
+    if (!first_there[node] || !last_there[node]) continue;
     for (const Modulation& modulation : modulations)
       fading[node].push_back(left_of(modulation.share[node]));
     samples.push_back(fading[node]);
   }
   const std::array<Fading, 3> centres = grouped(samples, times_s);
-  static constexpr std::array materials = {Material::mixed_water, Material::tissue, Material::still_water};
+  const bool is_water = T1_of(median_course(centres, 2, samples), times_s) >= least_water_T1_s;
+  const std::array materials = {Material::mixed_water, Material::tissue,
+                                is_water ? Material::still_water : Material::tissue};
   MaterialMap map(view.plane.rows, view.plane.columns);
-  const auto nodes_a_row = static_cast<size_t>((view.plane.columns + raster - 1) / raster);
   for (Eigen::Index column = 0; column < map.cols(); ++column) {
     for (Eigen::Index row = 0; row < map.rows(); ++row) {
       const Fading& here =
@@ -333,7 +403,6 @@ MaterialMap first_materials(const TagView& view) {
       map(row, column) = here.empty() ? Material::nothing : materials[nearest(centres, here)];
     }
   }
-  const double spacing_mm = view.waves[0].spacing_mm();
   remove_specks(map, view.plane, 4 * spacing_mm * spacing_mm);
   return map;
 }

@@ -54,6 +54,15 @@ void keep_results(TrackedView& tracked) {
     motion.covariance = {};
 }
 
+/// Why no line of a slice has a point: what was found to be no tissue, or not to be trusted.
+std::string why_without_points(const TrackedPoints& points) {
+  if (points.dropped.empty()) return "no line of tags was found in tissue";
+  std::string reasons;
+  for (const auto& [reason, count] : points.dropped)
+    reasons += fmt::format("{}{} ({})", reasons.empty() ? "" : ", ", reason, count);
+  return "none of the places on its lines can be trusted: " + reasons;
+}
+
 }  // namespace
 
 std::vector<TrackedSlice> track_views(std::vector<TagView> views, size_t threads,
@@ -77,14 +86,13 @@ std::vector<TrackedSlice> track_views(std::vector<TagView> views, size_t threads
   });
   std::vector<TrackedSlice> kept;
   for (size_t i = 0; i < slices.size(); ++i) {
-    if (faults[i]) {
-      problems.push_back({Severity::warning, "not-tracked", faults[i]->reason, slices[i].view.name, 1,
-                          "slices",
+    if (faults[i] || slices[i].points.points.empty())
+      problems.push_back({Severity::warning, "not-tracked",
+                          faults[i] ? faults[i]->reason : why_without_points(slices[i].points),
+                          slices[i].view.name, 1, "slices",
                           "Look at the images: is the specimen in the slice, and are its tags still seen in "
                           "the middle of the cycle?"});
-    } else {
-      kept.push_back(std::move(slices[i]));
-    }
+    if (!faults[i]) kept.push_back(std::move(slices[i]));
   }
   return kept;
 }

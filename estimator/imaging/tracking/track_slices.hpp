@@ -24,7 +24,7 @@ std::vector<TagView> tag_views(const ImageFolder& folder);
 using SlicesDone = std::function<void(size_t done, size_t all)>;
 
 /// Tracks all views on `threads` threads. Of each `TrackedSlice::tracked` the motion is kept, and of each phase its noise and the
-/// tissue's depth. A slice in which nothing can be tracked is left out and reported in `problems`.
+/// tissue's depth. A slice in which no tissue is found is left out; it and one that has no point are reported in `problems`.
 std::vector<TrackedSlice> track_views(std::vector<TagView> views, size_t threads,
                                       std::vector<Finding>& problems, const SlicesDone& progress = {});
 

@@ -26,11 +26,11 @@ double brightness(const RingScan& scan, int phase, const Eigen::Vector2d& x_mm) 
   const Eigen::Vector3d place(x_mm.x(), x_mm.y(), 0);
   const auto turns = [&](double along_mm) { return 2 * std::numbers::pi * along_mm / scan.tag_spacing_mm; };
   const double rest = turns(scan.normal().dot(place));
-  if (radius * radius < RingScan::inner_mm * RingScan::inner_mm + c)
+  if (radius * radius < scan.inner_mm * scan.inner_mm + c)
     return faded(650, std::exp(-t_s / 0.08), rest, scan.tagged);
   if (radius * radius < RingScan::outer_mm * RingScan::outer_mm + c)
     return faded(1000, std::exp(-t_s / 0.8), turns(scan.material_mm(phase, place)), scan.tagged);
-  return radius < RingScan::water_mm ? faded(650, std::exp(-t_s / 2.8), rest, scan.tagged) : 0.0;
+  return radius < scan.water_mm ? faded(650, std::exp(-t_s / 2.8), rest, scan.tagged) : 0.0;
 }
 
 void put(DcmDataset& data, const DcmTagKey& tag, const std::string& value) {

@@ -1,5 +1,5 @@
 #pragma once
-// Tagged images of a ring with known motion, written as DICOM: a ring of gel between water that stirs and water that rests. It inflates as
+// Tagged images of a ring with known motion, written as DICOM: a ring of gel between water that stirs and water that rests (or air). It inflates as
 // an incompressible body does, material (R) at r(t)^2 = R^2 + c(t), so that where each tag is seen is known in closed form.
 
 #include <Eigen/Dense>
@@ -33,7 +33,9 @@ struct RingScan {
   std::string uid = "1.2.3";  ///< what the instances' UIDs begin with
   unsigned seed = 1;
 
-  static constexpr double inner_mm = 18, outer_mm = 38, water_mm = 46;
+  double inner_mm = 18;
+  double water_mm = 46;  ///< how far the bath reaches; 0: the ring hangs in air
+  static constexpr double outer_mm = 38;
   [[nodiscard]] double time_ms(int phase) const { return first_ms + step_ms * (phase - 1); }
   [[nodiscard]] double inflation_mm2(int phase) const;
   /// n . X of the material that is seen at a place (patient coordinates), relative to n . x of the ring's centre at (0, 0).

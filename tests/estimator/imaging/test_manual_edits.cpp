@@ -96,7 +96,7 @@ std::vector<Eigen::Vector2d> true_line_px(const RingScan& scan, int frame, doubl
       across -= scan.material_mm(frame, {x.x(), x.y(), 0}) - plane_mm;
     }
     const Eigen::Vector2d x = across * normal + s * along;
-    const double inner = std::sqrt(RingScan::inner_mm * RingScan::inner_mm + c) + 2;
+    const double inner = std::sqrt(RingScan{}.inner_mm * RingScan{}.inner_mm + c) + 2;
     const double outer = std::sqrt(RingScan::outer_mm * RingScan::outer_mm + c) - 2;
     if (x.norm() > inner && x.norm() < outer)
       places.push_back((x - scan.origin_mm.head<2>()) / scan.pixel_mm);

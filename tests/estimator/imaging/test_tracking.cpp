@@ -97,6 +97,24 @@ TEST(Tracking, FollowsMirroredTurnedAndStretchedImagesAsWell) {
   }
 }
 
+TEST(Tracking, FollowsAThinWallInAirAsWellAsInWater) {
+  for (const double spacing_mm : {4.0, 6.0}) {
+    size_t in_water = 0;
+    for (const double water_mm : {46.0, 0.0}) {
+      const ScratchFolder scratch;
+      const RingScan scan{.tag_spacing_mm = spacing_mm, .inner_mm = 28, .water_mm = water_mm};
+      test::write_ring(scan, scratch.path());
+      const TrackedFolder tracked = track_folder({.folder = scratch.path(), .coordinates = "patient"});
+      const Errors errors = errors_of(scan, tracked);
+      EXPECT_LT(errors.rms_px, 0.1) << spacing_mm << ", water to " << water_mm;
+      EXPECT_LT(errors.worst_px, 0.5) << spacing_mm << ", water to " << water_mm;
+      if (water_mm > 0) in_water = errors.points;
+      EXPECT_GT(errors.points, in_water * 9 / 10) << spacing_mm << ", water to " << water_mm;
+    }
+    EXPECT_GT(in_water, 400U) << spacing_mm;
+  }
+}
+
 TEST(Tracking, NumbersFramesByPhaseAcrossAGap) {
   const ScratchFolder scratch;
   const RingScan scan{.missing_phase = 5};
