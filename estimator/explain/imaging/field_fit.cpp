@@ -16,8 +16,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double worth_a_step = 0.02;  // of chi2
-
 /// How far apart the models for a derivative lie, on each side.
 double perturbation_of(const EffectParameter& parameter) {
   if (parameter.scale == SearchScale::logarithmic) return 1e-3;

@@ -19,6 +19,9 @@
 
 namespace diastole::explain {
 
+/// Of chi2: a search of an imaged specimen's model, gel or other, ends where a step gains no more.
+inline constexpr double worth_a_step = 0.02;
+
 /// How an effect's parameter is searched.
 inference::Parameter searched(const EffectParameter& parameter);
 

@@ -23,7 +23,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double worth_a_step = 0.02;  // of chi2
 constexpr int iteration_limit = 60;    // of a fit: an inclusion's size and contrast trade off along a ridge
 
 std::vector<double> free_values(const FieldChoice& choice) {
