@@ -14,7 +14,7 @@ Word = Union[str, "os.PathLike[str]", int, float]
 
 
 class DiastoleError(RuntimeError):
-    """A command refused: `code` 1 is data that cannot be what they say or an interruption, 2 wrong usage or input, 3 a fault of hardware or link; the text says what to do."""
+    """A command refused: `code` 1 is data that cannot be what they say, 2 wrong usage or input, 3 a fault of hardware or link; the text says what to do."""
 
     def __init__(self, code: int, text: str) -> None:
         super().__init__(text)

@@ -23,7 +23,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int iteration_limit = 60;    // of a fit: an inclusion's size and contrast trade off along a ridge
+constexpr int iteration_limit = 60;  // of a fit: an inclusion's size and contrast trade off along a ridge
 
 std::vector<double> free_values(const FieldChoice& choice) {
   std::vector<double> values;
