@@ -6,6 +6,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <utility>
 
 #include "estimator/grids/displaced_points.hpp"
 #include "estimator/io/whole_file.hpp"
@@ -23,23 +24,6 @@ struct GridArguments {
   bool force = false;
 };
 
-ExitCode finish(const GridArguments& arguments, const FieldGrid& grid, size_t points,
-                const std::vector<std::string>& remarks, const CommandOutput& out) {
-  if (out.json) {
-    const nlohmann::ordered_json json = {{"mesh", arguments.output.string()},
-                                         {"elements", grid.cells.size()},
-                                         {"nodes", points},
-                                         {"fibres", false},
-                                         {"remarks", remarks}};
-    std::cout << json_text(json, 1) << '\n';
-    return ExitCode::done;
-  }
-  for (const std::string& remark : remarks)
-    fmt::print("{}\n", remark);
-  fmt::print("Written: {}\n", arguments.output.string());
-  return ExitCode::done;
-}
-
 ExitCode run_points(const GridArguments& arguments, const CommandOutput& out) {
   RequiredOutputs outputs({arguments.grid}, arguments.force);
   outputs.add(arguments.output, "frame,X_mm");
@@ -56,7 +40,8 @@ ExitCode run_points(const GridArguments& arguments, const CommandOutput& out) {
     write_whole_file(*arguments.frames, points.frames_csv);
     remarks.push_back(fmt::format("Pressures, without error, in {}.", arguments.frames->string()));
   }
-  return finish(arguments, grid, points.points, remarks, out);
+  return report_written({arguments.output, grid.cells.size(), points.points, false, std::move(remarks)},
+                        "Written:", out);
 }
 
 ExitCode run_surface(const GridArguments& arguments, const CommandOutput& out) {
@@ -73,7 +58,8 @@ ExitCode run_surface(const GridArguments& arguments, const CommandOutput& out) {
     remarks.push_back(fmt::format("{}: {} points.", choices[i].surface, found.points[i]));
     points += found.points[i];
   }
-  return finish(arguments, grid, points, remarks, out);
+  return report_written({arguments.output, grid.cells.size(), points, false, std::move(remarks)},
+                        "Written:", out);
 }
 
 void add_common(CLI::App& command, GridArguments& arguments, const char* output) {
@@ -92,6 +78,22 @@ void add_common(CLI::App& command, GridArguments& arguments, const char* output)
 }  // namespace
 
 double mm_per_unit(const std::string& unit) { return unit == "m" ? 1000.0 : unit == "cm" ? 10.0 : 1.0; }
+
+ExitCode report_written(const WrittenMesh& written, std::string_view sentence, const CommandOutput& out) {
+  if (out.json) {
+    const nlohmann::ordered_json json = {{"mesh", written.file.string()},
+                                         {"elements", written.elements},
+                                         {"nodes", written.nodes},
+                                         {"fibres", written.has_fibres},
+                                         {"remarks", written.remarks}};
+    std::cout << json_text(json, 1) << '\n';
+    return ExitCode::done;
+  }
+  for (const std::string& remark : written.remarks)
+    fmt::print("{}\n", remark);
+  fmt::print("{} {}\n", sentence, written.file.string());
+  return ExitCode::done;
+}
 
 void add_grid_commands(CLI::App& mesh, CommandLine& line) {
   auto points = std::make_shared<GridArguments>();

@@ -1,8 +1,6 @@
 #include <fmt/format.h>
 
-#include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -13,7 +11,6 @@
 #include "estimator/mesh/mesh_file.hpp"
 #include "estimator/model/study_model.hpp"
 #include "estimator/model/unloaded_model.hpp"
-#include "protocol/contract/json_text.hpp"
 
 namespace diastole {
 namespace {
@@ -29,19 +26,9 @@ struct MeshArguments {
 ExitCode write_mesh(const MeshArguments& arguments, const MeshBody& body,
                     const std::vector<std::string>& remarks, const CommandOutput& out) {
   write_whole_file(arguments.output, mesh_file_text(body));
-  if (out.json) {
-    const nlohmann::ordered_json json = {{"mesh", arguments.output.string()},
-                                         {"elements", body.mesh.element_count()},
-                                         {"nodes", body.mesh.node_count()},
-                                         {"fibres", body.fibres.has_value()},
-                                         {"remarks", remarks}};
-    std::cout << json_text(json, 1) << '\n';
-    return ExitCode::done;
-  }
-  for (const std::string& remark : remarks)
-    fmt::print("{}\n", remark);
-  fmt::print("The mesh is in {}\n", arguments.output.string());
-  return ExitCode::done;
+  return report_written(
+      {arguments.output, body.mesh.element_count(), body.mesh.node_count(), body.fibres.has_value(), remarks},
+      "The mesh is in", out);
 }
 
 ExitCode run_import(const MeshArguments& arguments, const CommandOutput& out) {
