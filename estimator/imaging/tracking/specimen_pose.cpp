@@ -241,7 +241,10 @@ SpecimenPose read_pose(const std::filesystem::path& file) {
     return {numbers[0], numbers[1], numbers[2]};
   };
   pose.origin_mm = vector("origin_mm");
-  pose.axes << vector("x_axis"), vector("y_axis"), vector("z_axis");
+  // One by one: the matrix's list of commas bears no exception in its middle.
+  pose.axes.col(0) = vector("x_axis");
+  pose.axes.col(1) = vector("y_axis");
+  pose.axes.col(2) = vector("z_axis");
   root.finish();
   const double off = (pose.axes.transpose() * pose.axes - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!(off <= 1e-3 && pose.axes.determinant() > 0))

@@ -192,6 +192,10 @@ TEST(SpecimenPose, RefusesAxesThatAreNone) {
                     "origin_mm = [0.0, 0.0, 0.0]\nx_axis = [1.0, 0.0, 0.0]\ny_axis = [0.5, 1.0, 0.0]\n"
                     "z_axis = [0.0, 0.0, 1.0]\n");
   EXPECT_THAT(test::message_of([&] { (void)read_pose(file); }), HasSubstr("right angles"));
+  const auto short_axis = scratch.write("short.pose.toml",
+                                        "origin_mm = [0, 0, 0]\nx_axis = [1, 0, 0]\ny_axis = [0, 1]\n"
+                                        "z_axis = [0, 0, 1]\n");
+  EXPECT_THAT(test::message_of([&] { (void)read_pose(short_axis); }), HasSubstr("y_axis"));
   const auto endless =
       scratch.write("endless.pose.toml",
                     "origin_mm = [0, 0, 0]\nx_axis = [1e200, 1e200, 0]\ny_axis = [1e200, -1e200, 0]\n"
