@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "estimator/explain/rig/reference_file.hpp"
+#include "estimator/explain/rig/reference_json.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "tests/changed_run.hpp"
 #include "tests/estimator/cli/run_command.hpp"
