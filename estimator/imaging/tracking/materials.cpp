@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "estimator/imaging/tracking/brightness.hpp"
@@ -16,9 +17,7 @@ constexpr double least_share = 0.1;
 
 /// Water that is stirred loses its tags within a phase or two, tissue keeps them for its T1 of 0.3 to 1.5 s, still water for 2 s and more.
 constexpr std::array typical_T1_s = {0.1, 0.8, 3.0};
-/// What fades in less is tissue all the same: beside air there is no still water, and the slower half of the wall is no other material. Tissue
-/// reads 0.6 to 0.95 s, still water between tissue and plates 1.3 s and more.
-constexpr double least_water_T1_s = 1.1;
+constexpr double least_still_T1_s = 2.0;
 /// Darker than a quarter of what is bright: plates, air, and the noise of both.
 constexpr double least_brightness = 0.25;
 /// A pixel that no material explains (a ghost, a fold) should not outvote its neighbours: 3 standard deviations.
@@ -88,7 +87,7 @@ size_t nearest(const std::array<Fading, 3>& centres, const Fading& fading) {
   return best;
 }
 
-/// k-means from what the typical materials do; a material that does not occur keeps its typical course.
+/// k-means from what typical materials do; a material that does not occur keeps its typical course.
 std::array<Fading, 3> grouped(const std::vector<Fading>& samples, const std::vector<double>& times_s) {
   std::array<Fading, 3> centres;
   for (size_t i = 0; i < 3; ++i) {
@@ -391,17 +390,37 @@ MaterialMap first_materials(const TagView& view) {
       fading[node].push_back(left_of(modulation.share[node]));
     samples.push_back(fading[node]);
   }
-  const std::array<Fading, 3> centres = grouped(samples, times_s);
-  const bool is_water = T1_of(median_course(centres, 2, samples), times_s) >= least_water_T1_s;
-  const std::array materials = {Material::mixed_water, Material::tissue,
-                                is_water ? Material::still_water : Material::tissue};
-  MaterialMap map(view.plane.rows, view.plane.columns);
-  for (Eigen::Index column = 0; column < map.cols(); ++column) {
-    for (Eigen::Index row = 0; row < map.rows(); ++row) {
-      const Fading& here =
-          fading[static_cast<size_t>(row / raster) * nodes_a_row + static_cast<size_t>(column / raster)];
-      map(row, column) = here.empty() ? Material::nothing : materials[nearest(centres, here)];
+  const auto map_of = [&](const std::array<Fading, 3>& centres, Material slowest) {
+    const std::array materials = {Material::mixed_water, Material::tissue, slowest};
+    MaterialMap map(view.plane.rows, view.plane.columns);
+    for (Eigen::Index column = 0; column < map.cols(); ++column) {
+      for (Eigen::Index row = 0; row < map.rows(); ++row) {
+        const Fading& here =
+            fading[static_cast<size_t>(row / raster) * nodes_a_row + static_cast<size_t>(column / raster)];
+        map(row, column) = here.empty() ? Material::nothing : materials[nearest(centres, here)];
+      }
     }
+    return map;
+  };
+  // What lies between two materials fades as one between them would, but is as wide as the window only.
+  const auto is_boundary = [&](const MaterialMap& map) {
+    return !deep_inside(map, Material::tissue, 0.5 * spacing_mm, view.plane).any();
+  };
+  const auto T1_of_slowest = [&](const std::array<Fading, 3>& centres) {
+    return T1_of(median_course(centres, 2, samples), times_s);
+  };
+  std::array<Fading, 3> centres = grouped(samples, times_s);
+  MaterialMap map = map_of(centres, Material::still_water);
+  if (is_boundary(map) && T1_of_slowest(centres) < least_still_T1_s) {
+    // The wall itself is among the slowest: alone, as in air, or with still water.
+    std::vector<Fading> slow;
+    std::copy_if(samples.begin(), samples.end(), std::back_inserter(slow),
+                 [&](const Fading& sample) { return nearest(centres, sample) == 2; });
+    const Fading stirred = centres[0];
+    centres = grouped(slow, times_s);
+    centres[0] = stirred;
+    map =
+        map_of(centres, T1_of_slowest(centres) < least_still_T1_s ? Material::tissue : Material::still_water);
   }
   remove_specks(map, view.plane, 4 * spacing_mm * spacing_mm);
   return map;

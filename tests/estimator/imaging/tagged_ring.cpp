@@ -29,7 +29,7 @@ double brightness(const RingScan& scan, int phase, const Eigen::Vector2d& x_mm) 
   if (radius * radius < scan.inner_mm * scan.inner_mm + c)
     return faded(650, std::exp(-t_s / 0.08), rest, scan.tagged);
   if (radius * radius < RingScan::outer_mm * RingScan::outer_mm + c)
-    return faded(1000, std::exp(-t_s / 0.8), turns(scan.material_mm(phase, place)), scan.tagged);
+    return faded(1000, std::exp(-t_s / scan.gel_T1_s), turns(scan.material_mm(phase, place)), scan.tagged);
   return radius < scan.water_mm ? faded(650, std::exp(-t_s / 2.8), rest, scan.tagged) : 0.0;
 }
 

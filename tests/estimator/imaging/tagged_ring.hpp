@@ -34,6 +34,7 @@ struct RingScan {
   unsigned seed = 1;
 
   double inner_mm = 18;
+  double gel_T1_s = 0.8;
   double water_mm = 46;  ///< how far the bath reaches; 0: the ring hangs in air
   static constexpr double outer_mm = 38;
   [[nodiscard]] double time_ms(int phase) const { return first_ms + step_ms * (phase - 1); }
