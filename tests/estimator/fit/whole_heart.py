@@ -89,6 +89,9 @@ with tempfile.TemporaryDirectory() as scratch:
 
     # As measured: the shares of all four sources, and a ridge.
     fit = fitted(heart / "heart.study.toml", "--fibre-sigma-deg", "2", "--geometry-sigma-mm", "0.25")
+    tracking = json.loads(next(heart.glob("*.tracking.json")).read_text())
+    lost = [finding for finding in tracking["findings"] if finding["id"] == "not-tracked"]
+    assert not lost, f"tags are followed in every slice: {lost}"
     for found in fit["parameters"].values():
         low, high = found["ci95"]
         lower, upper = found["bounds"]
