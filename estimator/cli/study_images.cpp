@@ -21,7 +21,7 @@ namespace diastole {
 namespace {
 
 /// Another number whenever the tracker gives other points for the same images.
-constexpr int tracker_version = 6;
+constexpr int tracker_version = 7;
 
 std::optional<imaging::SpecimenPose> pose_of(const Study& study) {
   if (!study.data.to_specimen) return std::nullopt;

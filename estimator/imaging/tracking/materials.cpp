@@ -18,6 +18,9 @@ constexpr double least_share = 0.1;
 /// Water that is stirred loses its tags within a phase or two, tissue keeps them for its T1 of 0.3 to 1.5 s, still water for 2 s and more.
 constexpr std::array typical_T1_s = {0.1, 0.8, 3.0};
 constexpr double least_still_T1_s = 2.0;
+/// Of the pixels of a band a twentieth wider than a spacing so many are half a spacing deep; tissue is two spacings wide, and of what lies
+/// between two materials noise makes a hundredth so deep.
+constexpr double boundary_share = 0.05;
 /// Darker than a quarter of what is bright: plates, air, and the noise of both.
 constexpr double least_brightness = 0.25;
 /// A pixel that no material explains (a ghost, a fold) should not outvote its neighbours: 3 standard deviations.
@@ -404,7 +407,9 @@ MaterialMap first_materials(const TagView& view) {
   };
   // What lies between two materials fades as one between them would, but is as wide as the window only.
   const auto is_boundary = [&](const MaterialMap& map) {
-    return !deep_inside(map, Material::tissue, 0.5 * spacing_mm, view.plane).any();
+    const auto deep = deep_inside(map, Material::tissue, 0.5 * spacing_mm, view.plane).count();
+    return static_cast<double>(deep) <
+           boundary_share * static_cast<double>((map == Material::tissue).count());
   };
   const auto T1_of_slowest = [&](const std::array<Fading, 3>& centres) {
     return T1_of(median_course(centres, 2, samples), times_s);

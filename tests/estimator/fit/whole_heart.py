@@ -89,13 +89,19 @@ with tempfile.TemporaryDirectory() as scratch:
 
     # As measured: the shares of all four sources, and a ridge.
     fit = fitted(heart / "heart.study.toml", "--fibre-sigma-deg", "2", "--geometry-sigma-mm", "0.25")
-    tracking = json.loads(next(heart.glob("*.tracking.json")).read_text())
-    lost = [finding for finding in tracking["findings"] if finding["id"] == "not-tracked"]
-    assert not lost, f"tags are followed in every slice: {lost}"
+    other = pathlib.Path(scratch) / "other"
+    run(EXAMPLE / "make", other, "--seed", "2", "--unmeasured")
+    of_other = json.loads(run("diastole", "track", other / "dicom", "-o", other / "heart.tags.csv", "--json"))["problems"]
+    for findings in json.loads(next(heart.glob("*.tracking.json")).read_text())["findings"], of_other:
+        lost = [finding for finding in findings if finding["id"] == "not-tracked"]
+        assert not lost, f"tags are followed in every slice, whatever the noise: {lost}"
+    # Nine tenths of b2's variance are the fibres' two degrees, along the ridge; what images, pressures and walls leave is small.
+    for name, most in {"C_kPa": 4, "b1": 4, "b2": 5, "b3": 4}.items():
+        found = fit["parameters"][name]
+        assert found["ci95"][1] < most * found["ci95"][0], f"{name}: {found} says nothing"
+        left = found["se"] / found["value"] * math.sqrt(1 - found["variance_shares"]["fibres"])
+        assert left < 0.15, f"{name}: {left} without the fibres' error"
     for found in fit["parameters"].values():
-        low, high = found["ci95"]
-        lower, upper = found["bounds"]
-        assert high / low < math.sqrt(upper / lower), f"{found}: less than half of what its bounds leave open is decided"
         shares = found["variance_shares"]
         assert set(shares) == {"images", "pressures", "fibres", "geometry"} and all(share > 0 for share in shares.values()), shares
     assert fit["directions"][0]["relative_sd"] > 5 * fit["directions"][-1]["relative_sd"], "the ridge is reported"

@@ -121,6 +121,33 @@ TEST(Tracking, FollowsAWallOfAnyFadingInAirAsWellAsInWater) {
   }
 }
 
+TEST(Tracking, FollowsAWallInAirThatEndsFarFromWhereItBegan) {
+  const ScratchFolder scratch;
+  // The inner edge moves by six of the wall's ten millimetres, and stays there.
+  const RingScan scan{.phases = 16, .most_mm2 = 400, .step_ms = 36, .inner_mm = 28, .water_mm = 0};
+  test::write_ring(scan, scratch.path());
+  const TrackedFolder tracked = track_folder({.folder = scratch.path(), .coordinates = "patient"});
+  const Errors errors = errors_of(scan, tracked);
+  EXPECT_LT(errors.rms_px, 0.06);
+  EXPECT_LT(errors.worst_px, 0.5);
+  EXPECT_GT(errors.points, 16U * 90U);
+}
+
+TEST(Tracking, ReportsASliceThatGivesNoPoint) {
+  const ScratchFolder scratch;
+  test::write_ring({}, scratch.path());
+  // A wall of a third of a spacing.
+  test::write_ring({.series = 3, .origin_mm = {-47.5, -47.5, 30.0}, .uid = "1.2.4", .inner_mm = 36.5},
+                   scratch.path(), "thin");
+  const TrackedFolder tracked = track_folder({.folder = scratch.path(), .coordinates = "patient"});
+  ASSERT_EQ(tracked.slices.size(), 2U);
+  EXPECT_FALSE(tracked.slices[0].points.points.empty());
+  EXPECT_TRUE(tracked.slices[1].points.points.empty());
+  EXPECT_THAT(tracked.problems,
+              testing::Contains(testing::AllOf(testing::Field(&Finding::id, "not-tracked"),
+                                               testing::Field(&Finding::where, "series 3, slice 1"))));
+}
+
 TEST(Tracking, NumbersFramesByPhaseAcrossAGap) {
   const ScratchFolder scratch;
   const RingScan scan{.missing_phase = 5};
