@@ -21,6 +21,7 @@
 #include "tests/fuzz/script.hpp"
 #include "tests/host/acquisition/session_on_desk.hpp"
 #include "tests/host/flash/update_files.hpp"
+#include "tests/host/rpc/usual_requests.hpp"
 
 namespace {
 
@@ -113,38 +114,10 @@ void write_rpc_lines(const std::filesystem::path& directory) {
                       R"("data":{"file":"f","place":"p","problem":"b","remedy":"r"}}})");
   line("hardware_fault",
        R"({"jsonrpc":"2.0","id":1,"error":{"code":-32002,"message":"rig: is away\n  Find it."}})");
-  const auto request = [](const char* method, const json& params = json::object()) {
+  const auto request = [](const std::string& method, const json& params = json::object()) {
     return json{{"jsonrpc", "2.0"}, {"id", 1}, {"method", method}, {"params", params}}.dump() + "\n";
   };
-  const std::string experiment =
-      "format = \"diastole-experiment\"\nversion = 1\n[[segment]]\nwaveform = \"uploaded\"\n"
-      "points = \"a.csv\"\nstroke_mL = 20\nperiod_s = 0.8\ncycles = 4\n";
-  const json facts{
-      {"specimen", "gel"}, {"operator", "Jo"}, {"room_temperature_C", 21.5}, {"notes", {"a note"}}};
-  const std::vector<std::pair<const char*, json>> requests{
-      {"rig.status", json::object()},
-      {"rig.home", json::object()},
-      {"rig.zero", {{"channels", {"cavity"}}, {"seconds", 5}, {"operator", "Jo"}}},
-      {"rig.calibrate", {{"channels", {"cavity"}}, {"kPa", 10}, {"seconds", 5}, {"operator", "Jo"}}},
-      {"rig.clear_fault", json::object()},
-      {"rig.jog", {{"mL", 5.0}, {"rate_mL_s", 1.0}}},
-      {"rig.settings", json::object()},
-      {"rig.write_settings", {{"set", {{"backlash_um", 40}, {"board_name", "MR1"}}}, {"defaults", true}}},
-      {"rig.self_test", {{"seconds", 10}}},
-      {"rig.black_box", json::object()},
-      {"run.start",
-       {{"experiment", experiment},
-        {"file", "e.toml"},
-        {"points", {{"a.csv", "phase,fraction\n0,0\n.5,1\n1,0\n"}}},
-        {"prompts_answered", true},
-        {"resume", false},
-        {"session", facts}}},
-      {"run.progress", {{"first_remark", 0}}},
-      {"run.trace", {{"run_id", "run-1"}, {"first_row", 0}, {"first_trigger", 0}}},
-      {"run.continue", {{"slice", 1}}},
-      {"run.stop", {{"how", "cycle_end"}}},
-  };
-  for (const auto& [method, params] : requests)
+  for (const auto& [method, params] : usual_requests())
     line(method, request(method, params));
   line("control", request("rig.home") + "\1" + request("console.sign_in", {{"name", "Ann"}}) + "\1" +
                       request("control.take") + "\1" + request("control.take", {{"take_over", "operator"}}) +

@@ -3,57 +3,17 @@
 #include <gmock/gmock.h>
 
 #include <filesystem>
-#include <map>
 #include <nlohmann/json.hpp>
 
 #include "host/rpc/json_rpc.hpp"
 #include "protocol/contract/json_text.hpp"
 #include "tests/host/bench/rig_on_paper.hpp"
+#include "tests/host/rpc/usual_requests.hpp"
 
 namespace diastole {
 namespace {
 
 using nlohmann::json;
-
-constexpr const char* experiment = R"(format = "diastole-experiment"
-version = 1
-[[segment]]
-waveform = "uploaded"
-points = "a.csv"
-stroke_mL = 20
-period_s = 0.8
-cycles = 4
-)";
-
-/// What each method takes.
-const std::map<std::string, json>& orders() {
-  static const std::map<std::string, json> all{
-      {"rig.status", json::object()},
-      {"rig.home", json::object()},
-      {"rig.zero", {{"channels", json::array({"cavity"})}, {"seconds", 5}, {"operator", "Jo"}}},
-      {"rig.calibrate",
-       {{"channels", json::array({"cavity"})}, {"kPa", 10}, {"seconds", 5}, {"operator", "Jo"}}},
-      {"rig.clear_fault", json::object()},
-      {"rig.jog", {{"mL", 5.0}, {"rate_mL_s", 1.0}}},
-      {"rig.settings", json::object()},
-      {"rig.write_settings", {{"set", {{"backlash_um", 40}, {"board_name", "MR1"}}}, {"defaults", true}}},
-      {"rig.self_test", {{"seconds", 10}}},
-      {"rig.black_box", json::object()},
-      {"run.start",
-       {{"experiment", experiment},
-        {"file", "e.toml"},
-        {"points", {{"a.csv", "phase,fraction\n0,0\n.5,1\n1,0\n"}}},
-        {"prompts_answered", true},
-        {"resume", false},
-        {"session",
-         {{"specimen", "gel"}, {"room_temperature_C", 21.5}, {"notes", json::array({"a note"})}}}}},
-      {"run.progress", {{"first_remark", 0}}},
-      {"run.trace", {{"run_id", "run-1"}, {"first_row", 0}, {"first_trigger", 0}}},
-      {"run.continue", {{"slice", 1}}},
-      {"run.stop", {{"how", "cycle_end"}}},
-  };
-  return all;
-}
 
 /// What a client that sends this reads: {"result"} or {"error"}.
 json answer_to(const Method& method, const json& sent) {
@@ -77,11 +37,11 @@ json answer_to(const Method& method, const json& sent) {
 
 TEST(Methods, EachCarriesOutItsOrder) {
   for (const Method& method : methods()) {
-    ASSERT_TRUE(orders().contains(std::string(method.name))) << method.name;
-    const json answer = answer_to(method, orders().at(std::string(method.name)));
+    ASSERT_TRUE(usual_requests().contains(std::string(method.name))) << method.name;
+    const json answer = answer_to(method, usual_requests().at(std::string(method.name)));
     EXPECT_TRUE(answer.contains("result")) << method.name << ": " << answer.dump();
   }
-  EXPECT_EQ(methods().size(), orders().size());
+  EXPECT_EQ(methods().size(), usual_requests().size());
 }
 
 TEST(Methods, ParametersOfAnyKindAreTakenOrRefusedAsTheClientsFault) {
@@ -96,9 +56,9 @@ TEST(Methods, ParametersOfAnyKindAreTakenOrRefusedAsTheClientsFault) {
                                  json::object(),
                                  json::array({1, json::object()})};
   for (const Method& method : methods()) {
-    for (const auto& [name, usual] : orders().at(std::string(method.name)).items()) {
+    for (const auto& [name, usual] : usual_requests().at(std::string(method.name)).items()) {
       for (const json& value : values) {
-        json params = orders().at(std::string(method.name));
+        json params = usual_requests().at(std::string(method.name));
         params[name] = value;
         const json answer = answer_to(method, params);
         if (answer.contains("result")) continue;
@@ -112,7 +72,7 @@ TEST(Methods, ParametersOfAnyKindAreTakenOrRefusedAsTheClientsFault) {
 
 TEST(Methods, NumbersThatNoOrderMayHaveAreRefused) {
   const auto is_refused = [](const char* method, const char* name, const json& value) {
-    json params = orders().at(method);
+    json params = usual_requests().at(method);
     params[name] = value;
     return answer_to(*find_method(method), params).contains("error");
   };
