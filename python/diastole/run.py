@@ -31,14 +31,14 @@ class Run:
     def __init__(self, path: Path) -> None:
         self.path = pathlib.Path(path)
         with RunFile(self.path) as file:
-            root = file.attributes("/")
-            if root.get("format") != "diastole-run":
-                raise ValueError(f"{self.path}: is no run file of Diastole")
-            self.run_id, self.started_utc, self.producer = (str(root.get(name, "")) for name in ("run_id", "started_utc", "producer"))
-            self.rig: dict[str, Any] = file.attributes("rig")
+            if (root := file.attributes("/")).get("format") != "diastole-run" or root.get("format_version") != 1:
+                raise ValueError(f"{self.path}: is no run file of Diastole, or one of another version (format_version) than 1")
+            required = (str(root[name]) if name in root else file.refuse(f"attribute {name}", "is missing") for name in ("run_id", "started_utc", "producer"))
+            self.run_id, self.started_utc, self.producer = required
+            self.rig: dict[str, Any] = file.attributes("rig") or file.refuse("group /rig", "is missing")
             self.session: dict[str, Any] = file.attributes("session")
-            notes = [f"session/notes/{number}" for number in file.names("session/notes")]
-            self.notes = [Note(file.attributes(n).get("written_utc", ""), file.attributes(n).get("author", ""), file.text(n)) for n in notes]
+            notes = {note: file.attributes(note) for note in (f"session/notes/{number}" for number in file.names("session/notes"))}
+            self.notes = [Note(of.get("written_utc", ""), of.get("author", ""), file.text(note)) for note, of in notes.items()]
             self.experiment = file.text("protocol/toml")
             self.segments = file.table("protocol/segments")
             self.channels = [name for name in file.names("pressure") if name.endswith("_kPa")]

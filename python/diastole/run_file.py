@@ -60,7 +60,7 @@ class RunFile:
         attributes, values = self._file[path].attrs if path in self._file else {}, {}
         for name in attributes:
             found, kind = attributes.get_id(name), attributes.get_id(name).get_type()
-            if kind.get_class() in NUMBERS + TEXTS and kind.get_size() <= self._bytes and math.prod(found.shape) == 1:
+            if kind.get_class() in NUMBERS + TEXTS and kind.get_size() <= self._bytes and found.get_space().get_simple_extent_npoints() == 1:
                 values[name] = self._value(np.asarray(attributes[name], dtype=object).reshape(-1)[0])
         return values
 

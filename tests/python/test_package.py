@@ -101,6 +101,26 @@ class HostileFiles(InAFolder):
                 said = [line for line in refused if line.startswith("ValueError: ")]
                 self.assertTrue(said and expected in said[0] and str(file) in said[0], refused[-3:])
 
+    def test_what_a_run_file_has_to_hold_is_asked_for(self):
+        sound = diastole.simulate(self.folder / "e.toml", self.folder / "sound.run.h5").path
+        file = self.folder / "other.run.h5"
+
+        def refusal(change):
+            shutil.copy(sound, file)
+            with h5py.File(file, "r+") as run:
+                change(run)
+            with self.assertRaises(ValueError) as refused:
+                diastole.Run(file)
+            return str(refused.exception)
+
+        self.assertIn("another version", refusal(lambda run: run.attrs.modify("format_version", 99)))
+        self.assertIn("attribute run_id: is missing", refusal(lambda run: run.attrs.pop("run_id")))
+        self.assertIn("group /rig: is missing", refusal(lambda run: run.pop("rig")))
+        shutil.copy(sound, file)
+        with h5py.File(file, "r+") as run:
+            run.require_group("session").attrs["operator"] = h5py.Empty("f")
+        self.assertNotIn("operator", diastole.Run(file).session)
+
     def test_what_only_a_plug_in_unpacks_is_refused_unread(self):
         file = diastole.simulate(self.folder / "e.toml", self.folder / "a.run.h5").path
         with h5py.File(file, "r+") as run:
