@@ -34,11 +34,14 @@ void print_reference(const explain::Reference& reference, const std::filesystem:
     fmt::print("  {:<12} {:>8.1f} {}   {:.2f} % of the range\n", rig::name_of(signal),
                reference.rms[s] * (volume ? 1.0 : 1e3), volume ? "mL" : "Pa", reference.percent_of_range[s]);
   }
-  fmt::print(
-      "\n  tolerances that differ from what /rig states by more than two of their standard deviations\n");
+  std::string departures;
   for (size_t i = 0; i < reference.tolerances.size(); ++i)
     if (const double mean = reference.mean[static_cast<Eigen::Index>(i)]; std::abs(mean) > 2.0)
-      fmt::print("    {:<22} {:+.1f}\n", reference.tolerances[i], mean);
+      departures += fmt::format("    {:<22} {:+.1f}\n", reference.tolerances[i], mean);
+  if (!departures.empty())
+    fmt::print(
+        "\n  tolerances that differ from what /rig states by more than two of their standard deviations\n{}",
+        departures);
   fmt::print("\nIn {}. A study of this rig names it: [data] reference = [\"{}\"]\n", output.string(),
              output.filename().string());
 }
@@ -62,19 +65,25 @@ ExitCode run_reference(const ReferenceArguments& arguments, const CommandOutput&
           fmt::print(stderr, "reference: {}\n", what);
         });
     reference.fingerprint = fingerprints;
-    const std::string text = explain::to_json(reference);
-    write_whole_file(arguments.output, text);
-    if (out.json) {
-      std::cout << text;
-    } else {
-      print_reference(reference, arguments.output);
+    // A fit without a result leaves no numbers: nothing that a file could hold.
+    const bool has_numbers = reference.mean.allFinite() && reference.covariance.allFinite();
+    if (has_numbers) {
+      const std::string text = explain::to_json(reference);
+      write_whole_file(arguments.output, text);
+      if (out.json) {
+        std::cout << text;
+      } else {
+        print_reference(reference, arguments.output);
+      }
     }
-    if (!inference::is_settled(reference.termination)) {
+    if (!has_numbers || !inference::is_settled(reference.termination)) {
       fmt::print(stderr,
                  "diastole reference: a session's fit did not settle, so that nothing can be named with this "
-                 "reference. {}\n"
-                 "  Leave sessions out one by one to find which; something may be wrong in it.\n",
-                 inference::sentence(reference.termination));
+                 "reference{}. {}\n"
+                 "  Leave sessions out one by one to find which; something may be wrong in it: `diastole "
+                 "inspect RUN` "
+                 "shows what was recorded.\n",
+                 has_numbers ? "" : ", and it is not written", inference::sentence(reference.termination));
       return ExitCode::negative;
     }
   } catch (const ReferenceInterrupted&) {

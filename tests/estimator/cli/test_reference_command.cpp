@@ -45,6 +45,7 @@ TEST_F(ReferenceCommand, SaysWhenAFitDidNotSettleAndExitsWithOne) {
   EXPECT_EQ(learn().code, ExitCode::negative);
   EXPECT_THAT(remarks_, HasSubstr("a session's fit did not settle"));
   EXPECT_THAT(remarks_, HasSubstr("Leave sessions out one by one"));
+  EXPECT_FALSE(fs::exists(at("rig.reference.json"))) << "it would hold no numbers";
 }
 
 }  // namespace
