@@ -23,6 +23,7 @@ class Place:
         os.symlink(pathlib.Path(source) / "examples", self.folder / "examples")
         (self.folder / "tests").mkdir()
         os.symlink(pathlib.Path(source) / "tests/data", self.folder / "tests/data")
+        self.skipped = []  # what this machine lacks something for
         self.environment = dict(os.environ, XDG_CACHE_HOME=str(self.folder / "cache"))
 
     def run(self, line, codes=(0,)):
@@ -219,7 +220,7 @@ def of_board(place):
     yield "flash", place.run("flash --new-key key.pem")
     image = place.firmware / "bin/diastole-stm32f405.image"
     if not image.exists():
-        print(f"flash of an image: skipped, there is no {image}: build the preset `firmware` first")
+        place.skipped.append(f"flash of an image: there is no {image}: build the preset `firmware` first")
         return
     shutil.copy(image, place.folder / "own.image")
     yield "flash", place.run("flash own.image --sign key.pem --counter 3")

@@ -16,6 +16,7 @@ import jsonschema
 import documents
 
 NO_DOCUMENT = {"daemon"}
+SKIPPED = 77  # of CMake's SKIP_RETURN_CODE
 
 
 def errors_of(validator, document):
@@ -40,7 +41,8 @@ def main(source, programs, slow):
     problems += [f"docs/schema has a schema of {name}, which is no command" for name in sorted(set(validators) - commands)]
 
     with tempfile.TemporaryDirectory() as work:
-        for command, document in documents.documents(documents.Place(work, programs, source), slow):
+        place = documents.Place(work, programs, source)
+        for command, document in documents.documents(place, slow):
             seen.add(command)
             found = list(errors_of(validators[command], document))
             print(f"{command}: {'as its schema says' if not found else found[0]}", flush=True)
@@ -53,8 +55,8 @@ def main(source, programs, slow):
 
     if (source / "python/diastole/results.pyi").read_text() != stub():
         problems.append("python/diastole/results.pyi is not what the schemas make: tools/json_schema python")
-    print("\n".join(problems), file=sys.stderr)
-    return 1 if problems else 0
+    print("\n".join(problems + [f"skipped: {what}" for what in place.skipped]), file=sys.stderr)
+    return 1 if problems else SKIPPED if place.skipped else 0
 
 
 if __name__ == "__main__":
