@@ -155,25 +155,31 @@ void remark_on_bounds(const Study& study, const explain::Explanation& found) {
   }
 }
 
-/// The files of an explanation, whose names it gets.
-void write_explanation(const Study& study, explain::Explanation& found, const fs::path& folder) {
+struct ExplanationFiles {
+  fs::path folder;
+  fs::path json = folder / explanation_file, study = folder / study_file, page = folder / report_file,
+           learned = folder / learned_file;
+};
+
+/// The explanation gets the files' names.
+void write_explanation(const Study& study, explain::Explanation& found, const ExplanationFiles& files) {
   std::error_code missing;
   if (!found.effects.empty()) {
     found.study_after = study_file;
-    write_whole_file(folder / study_file,
+    write_whole_file(files.study,
                      fmt::format("{}: {}.\n", study_mark, explain::name_of(found.verdict)) +
-                         explain::explained_study(study, folder, found.effects, found.shifts));
+                         explain::explained_study(study, files.folder, found.effects, found.shifts));
   } else {
-    fs::remove(folder / study_file, missing);  // of an earlier explanation
+    fs::remove(files.study, missing);  // of an earlier explanation
   }
   if (found.learned) {
     found.learned->effect_file = learned_file;
-    explain::write_learned_file(folder / learned_file, found.learned->toml);
+    explain::write_learned_file(files.learned, found.learned->toml);
   } else {
-    explain::remove_learned_file(folder / learned_file);
+    explain::remove_learned_file(files.learned);
   }
-  write_whole_file(folder / explanation_file, explain::to_json(found));
-  write_whole_file(folder / report_file, report::make_report(found));
+  write_whole_file(files.json, explain::to_json(found));
+  write_whole_file(files.page, report::make_report(found));
 }
 
 ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out) {
@@ -184,10 +190,7 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
   use_images(study);
   study.effect_files.insert(study.effect_files.end(), arguments.with.begin(), arguments.with.end());
   effects_known_to(study);  // refuses what is no effect before the folder is made
-  const fs::path json_file = arguments.folder / explanation_file;
-  const fs::path new_study = arguments.folder / study_file;
-  const fs::path page = arguments.folder / report_file;
-  const fs::path learned = arguments.folder / learned_file;
+  const ExplanationFiles files{arguments.folder};
   std::error_code error;
   MadeFolder folder;
   if (fs::create_directories(arguments.folder, error)) folder.made = arguments.folder;
@@ -196,10 +199,10 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
                       fmt::format("the folder cannot be made: {}", error.message()),
                       "Name a folder that you may write."});
   }
-  require_output({json_file, inputs_of(study), explain::explanation_file_mark, arguments.force});
-  require_output({new_study, inputs_of(study), study_mark, arguments.force});
-  require_output({page, inputs_of(study), report::page_mark, arguments.force});
-  explain::require_learned_file(learned, inputs_of(study), arguments.force);
+  require_output({files.json, inputs_of(study), explain::explanation_file_mark, arguments.force});
+  require_output({files.study, inputs_of(study), study_mark, arguments.force});
+  require_output({files.page, inputs_of(study), report::page_mark, arguments.force});
+  explain::require_learned_file(files.learned, inputs_of(study), arguments.force);
   const Interruption interruption;
   explain::Explanation found;
   try {
@@ -214,7 +217,7 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
     return ExitCode::negative;
   }
   remark_on_bounds(study, found);
-  write_explanation(study, found, arguments.folder);
+  write_explanation(study, found, files);
   if (out.json) {
     explain::Explanation brief = found;
     brief.traces.clear();

@@ -139,8 +139,7 @@ ExitCode run_pv(const PvArguments& arguments, const CommandOutput& out) {
   const Study study = read_study(arguments.study);
   remark_on_imaged_load(study, "pv");
   std::vector<Finding> findings;
-  ElasticModel model = make_affected_model(study, with_progress("pv"), &findings);
-  print_findings(findings, stderr);
+  ElasticModel model = make_model_and_print_findings(study, with_progress("pv"), findings);
   require_closed_cavity(study, model);
   remark_on_size(model.mesh(), "pv");
   const Interruption interruption;

@@ -282,8 +282,7 @@ ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
     print_findings(findings, stderr);
     unloaded = unload(study, options);
   } else {
-    as_given = make_affected_model(study, std::move(options), &findings);
-    print_findings(findings, stderr);
+    as_given = make_model_and_print_findings(study, std::move(options), findings);
     remark_on_imaged_load(study, "solve");
   }
   ElasticModel& model = unloaded ? unloaded->model : *as_given;

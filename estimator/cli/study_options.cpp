@@ -3,6 +3,11 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <utility>
+
+#include "estimator/cli/output_files.hpp"
+#include "estimator/model/affected_model.hpp"
+#include "protocol/contract/input_error.hpp"
 
 namespace diastole {
 
@@ -42,6 +47,21 @@ Study read_study(const StudyOptions& options) {
   if (!options.mesh.empty()) set_mesh(study, options.mesh);
   if (!options.refine.empty()) set_refinement(study, options.refine);
   return study;
+}
+
+ElasticModel make_model_and_print_findings(const Study& study, SolveOptions options,
+                                           std::vector<Finding>& findings) {
+  const auto made = [&]() -> ElasticModel {
+    try {
+      return make_affected_model(study, std::move(options), &findings);
+    } catch (const InputError&) {
+      print_findings(findings, stderr);
+      throw;
+    }
+  };
+  ElasticModel model = made();
+  print_findings(findings, stderr);
+  return model;
 }
 
 void remark_on_size(const HermiteMesh& mesh, std::string_view command) {

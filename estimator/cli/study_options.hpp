@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "estimator/fe/elastic_model.hpp"
+#include "estimator/io/finding.hpp"
 #include "estimator/io/study.hpp"
 
 namespace diastole {
@@ -30,6 +31,11 @@ void add_unloading(CLI::App& command, StudyOptions& options);
 
 /// The study with its replaced values. Throws InputError.
 Study read_study(const StudyOptions& options);
+
+/// The study's model (make_affected_model). Prints on standard error, and keeps, what is doubtful about it; prints it also if no model can
+/// be made, for which it may be the reason.
+ElasticModel make_model_and_print_findings(const Study& study, SolveOptions options,
+                                           std::vector<Finding>& findings);
 
 /// Asks on standard error, in the name of a command, whether a body so small or so large is meant to be in millimetres.
 void remark_on_size(const HermiteMesh& mesh, std::string_view command);

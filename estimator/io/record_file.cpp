@@ -48,8 +48,11 @@ void RecordFormat::read(std::string_view text, const std::string& file,
     throw refused("", fmt::format("is not {}: {}", kind, error.what()));
   } catch (const Json::parse_error& error) {
     throw refused(place_of(text, error.byte), fmt::format("is not {}: this is no JSON", kind));
-  } catch (const Json::out_of_range&) {
-    throw refused("", fmt::format("is not {}: it has a number beyond all that are kept", kind));
+  } catch (const Json::exception& error) {
+    constexpr int number_overflow = 406;
+    throw refused("", fmt::format("is not {}: {}", kind,
+                                  error.id == number_overflow ? "it has a number beyond all that are kept"
+                                                              : "a value is missing or of another kind"));
   }
 }
 

@@ -24,7 +24,7 @@ bool is_gel(const Study& study);
 
 /// make_model (estimator/model/study_model.hpp) with the study's effects: those of gel, or those of any other specimen
 /// (changed_specimen.hpp). Throws InputError besides if the specimen cannot have them. `findings` gets those of model_findings, without
-/// another fit of measured fibres.
+/// another fit of measured fibres (which the callers of `unload` and of a fit's motion do make).
 ElasticModel make_affected_model(const Study& study, SolveOptions options = {},
                                  std::vector<Finding>* findings = nullptr);
 

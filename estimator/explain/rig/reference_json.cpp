@@ -111,16 +111,17 @@ void take_tolerances(const LearntTolerances& learnt, Reference& reference) {
 }
 
 void take_channel(const std::string& name, const ChannelMisfit& channel, Reference& reference) {
+  size_t signal = 0;
+  while (signal < rig::signal_count && rig::name_of(static_cast<rig::Signal>(signal)) != name)
+    ++signal;
+  if (signal == rig::signal_count) return;  // of a later version
   const std::string member = "channels." + name;
   if (!channel.rms_mL && !channel.rms_Pa) throw MemberFault("has neither rms_mL nor rms_Pa", member);
   const double rms = channel.rms_mL ? *channel.rms_mL : 1e-3 * *channel.rms_Pa;
   require_number(rms, member + (channel.rms_mL ? ".rms_mL" : ".rms_Pa"));
   require_number(channel.percent_of_range, member + ".percent_of_range");
-  for (size_t s = 0; s < rig::signal_count; ++s) {
-    if (rig::name_of(static_cast<rig::Signal>(s)) != name) continue;
-    reference.rms[s] = rms;
-    reference.percent_of_range[s] = channel.percent_of_range;
-  }
+  reference.rms[signal] = rms;
+  reference.percent_of_range[signal] = channel.percent_of_range;
 }
 
 Reference reference_in(const Document& document) {

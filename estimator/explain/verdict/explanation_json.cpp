@@ -127,7 +127,7 @@ Explanation explanation_from_json(std::string_view text, const std::string& file
   format.read(text, file, [&](const Json& json) {
     read_json(json, explanation, MissingMembers::kept);
     for (const char* key : {"verdict", "effects", "where", "gap"})
-      if (!json.contains(key)) throw std::invalid_argument(fmt::format("has no key {}", key));
+      if (!json.contains(key)) throw MemberFault("is missing", key);
     require_sound(explanation);
   });
   return explanation;

@@ -92,7 +92,7 @@ std::string problem_of(const std::string& text) {
 
 TEST(ExplanationJson, NamesWhatIsWrong) {
   EXPECT_THAT(problem_of("{"), HasSubstr("e.json"));
-  EXPECT_THAT(problem_of(R"({"effects": [], "where": [], "gap": {}})"), HasSubstr("has no key verdict"));
+  EXPECT_THAT(problem_of(R"({"effects": [], "where": [], "gap": {}})"), HasSubstr("key verdict: is missing"));
   EXPECT_THAT(problem_of(R"({"verdict": "perhaps", "effects": [], "where": [], "gap": {}})"),
               HasSubstr("key verdict: \"perhaps\" is no verdict"));
   EXPECT_THAT(problem_of(R"({"verdict": "none", "effects": [], "where": [{"phase": [1]}], "gap": {}})"),

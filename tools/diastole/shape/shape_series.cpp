@@ -37,7 +37,7 @@ void add_request_to(CLI::App& command, ShapeRequest& request) {
       .add_option("--tolerance-percent", request.tolerance_percent,
                   "NRMSE up to which the specimen follows the curve; exit code 1 beyond it")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number);
   command.add_option("--cycles", request.plan.cycles, "of a run, the first three of which set in")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000));
@@ -148,7 +148,7 @@ ExitCode ShapeSeries::carry_out(const std::string& output, bool force, const Acq
   }
   if (shaping.lesson.ending == Ending::changed) code = std::max(code, ExitCode::negative);
   const bool is_within = shaping.lesson.best && shaper.is_within_tolerance(shaping.nrmse);
-  const bool is_missed = shaping.lesson.best && !is_within && end.empty();
+  const bool is_missed = shaping.lesson.best && !is_within;
   if (is_missed) code = std::max(code, ExitCode::negative);
   if (!page_.empty()) write_whole_file(page_, shaping_page(shaping, shaper.wanted_mL(), shaper.target()));
   if (!end.empty())
