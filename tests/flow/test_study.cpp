@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <chrono>
 #include <cmath>
 
 #include "protocol/signal/step_response.hpp"
@@ -15,7 +16,10 @@
 namespace diastole::flow {
 namespace {
 
+using namespace std::chrono_literals;
+using namespace nlohmann::literals;
 using nlohmann::json;
+using std::chrono::steady_clock;
 using testing::HasSubstr;
 
 constexpr const char* study_toml = R"(format = "diastole-experiment"
@@ -117,39 +121,55 @@ TEST(Study, BecomesSlicesFramesAndABidsRecording) {
 TEST(Study, GoesOnWithTheNextSliceWhenItWasStopped) {
   RigWithDaemon rig(RigWithDaemon::Time::conducted);
   rig.start_daemon();
-  const std::string study = with(study_toml, "prompt = \"Set the next slice.\"\n", "");
-  rig.place.write("study.experiment.toml", study);
-  const auto resume = [&] {
-    return run(rig.place, {"diastole", "run", "study.experiment.toml", "-o", "rest.run.h5", "--resume",
-                           "--socket", rig.path("socket"), "--json"});
-  };
+  rig.place.write("study.experiment.toml", study_toml);
+  const std::vector<std::string> resume{
+      "diastole", "run",      "study.experiment.toml", "-o",    "rest.run.h5",
+      "--resume", "--socket", rig.path("socket"),      "--json"};
   auto client = rig.client();
   home(client);
-  const Ended too_early = resume();
+  const Ended too_early = run(rig.place, resume);
   EXPECT_EQ(too_early.exit_code, 2);
   EXPECT_THAT(too_early.err, HasSubstr("has no session to resume"));
 
-  client.call("run.start", {{"experiment", study}, {"file", "study.experiment.toml"}});
-  json progress;
-  do {
-    progress = client.call("run.progress");
-    if (progress["schedule"]["slice"] == 1 && progress["schedule"]["phase"] == "imaging")
-      client.call("run.stop");
-  } while (progress["state"] == "running" || progress["state"] == "writing");
-  EXPECT_EQ(progress["result"]["end"], "stopped_now");
+  // Simulated time races on, but a session waits at its prompts.
+  const auto state_when = [&client](const auto& reached) {
+    json progress = client.call("run.progress");
+    for (const auto end = steady_clock::now() + 30s; !reached(progress) && steady_clock::now() < end;)
+      progress = client.call("run.progress");
+    EXPECT_TRUE(reached(progress)) << progress.dump();
+    return progress;
+  };
+  const auto wait_at_prompt_of = [&](int slice) {
+    state_when([slice](const json& progress) {
+      return progress.at("state") == "running" &&  // and not the end of a run before
+             progress.value("/schedule/phase"_json_pointer, "") == "waiting" &&
+             progress.value("/schedule/slice"_json_pointer, -1) == slice;
+    });
+  };
+  client.call("run.start", {{"experiment", study_toml}, {"file", "study.experiment.toml"}});
+  wait_at_prompt_of(0);
+  client.call("run.continue", {{"slice", 0}});
+  wait_at_prompt_of(1);
+  client.call("run.stop");
+  const json stopped = state_when([](const json& progress) { return progress.at("state") == "done"; });
+  EXPECT_EQ(stopped.at("result").at("end"), "stopped_now");
   client.call("control.release");
 
-  const Ended rest = resume();
+  Program resumed(rig.place, resume);
+  wait_at_prompt_of(1);
+  client.call("run.continue", {{"slice", 1}});
+  const Ended rest = resumed.wait();
   ASSERT_EQ(rest.exit_code, 0) << rest.err;
   EXPECT_THAT(rest.err, HasSubstr("goes on: 1 of its 3 slices are imaged"));
   EXPECT_THAT(rest.err, HasSubstr("slice 2 of 3: 4 cycles of tagged"));
-  EXPECT_EQ(rest.json().at("triggers"), 2 + 4 + 1 + 2 + 4);
+  EXPECT_GE(rest.json().at("triggers"), 2 + 4 + 1 + 2 + 4) << "and the cycles of waiting";
   const json slices = run(rig.place, {"diastole", "inspect", "rest.run.h5", "--json"}).json().at("slices");
   ASSERT_EQ(slices.size(), 2U);
   EXPECT_EQ(slices[0].at("slice"), 1);
+  EXPECT_EQ(slices[0].at("triggers"), 4);
   EXPECT_EQ(slices[1].at("block"), "flow");
   std::filesystem::remove(rig.place / "rest.run.h5");
-  EXPECT_THAT(resume().err, HasSubstr("nothing left to do: all 3 slices"));
+  EXPECT_THAT(run(rig.place, resume).err, HasSubstr("nothing left to do: all 3 slices"));
 }
 
 TEST(RunFile, OfALongRunIsMadeAndReadInAsMuchMemoryAsOfAShortOne) {
