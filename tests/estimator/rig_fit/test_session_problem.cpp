@@ -177,7 +177,9 @@ TEST(SessionProblem, ItsStepsErrByFarLessThanTheModel) {
       SessionModel with = base;
       if (one.id != nullptr) {
         with.terms = {{find_effect(one.id), {}}};
-        with.values = {one.value};
+        for (const EffectParameter& parameter : find_effect(one.id)->parameters())
+          with.values.push_back(parameter.neutral);
+        with.values[0] = one.value;
       }
       const auto errors = error_of_steps(problem, with);
       EXPECT_LT(std::ranges::max(errors), one.within) << (one.id ? one.id : "as described") << has_pump;
