@@ -208,6 +208,7 @@ LinearFeatures smooth_discrepancy(const EffectSet& plain, const MatrixXd& functi
     if (best_list.empty()) break;
     chosen = best_list;
   }
+  if (chosen.empty()) return {target, plain.columns};
   // A size is before the data what it was found to be, as an effect's.
   const MatrixXd columns = functions(Eigen::all, chosen) * sizes.asDiagonal();
   LinearFeatures with{target - columns.rowwise().sum(),
