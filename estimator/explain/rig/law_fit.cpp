@@ -179,10 +179,14 @@ LawFit fit_law(const LawProblem& problem, const rig::ModelError& error, const Cu
   best.sd = spread_of(best, prior);
   if (const MatrixXd& increments = prior.increments(); increments.cols() > 0) {
     const std::vector<Index> present = present_increments(problem, best.evidence, best.root, increments);
-    const MatrixXd kept = increments(Eigen::all, present);
-    const MatrixXd known = best.root.triangularView<Eigen::Lower>().solve(kept);
-    const Eigen::LLT<MatrixXd> information(known.transpose() * known);
-    best.root = information.matrixL().solve(kept.transpose()).transpose();
+    if (present.empty()) {
+      best.root.resize(best.root.rows(), 0);
+    } else {
+      const MatrixXd kept = increments(Eigen::all, present);
+      const MatrixXd known = best.root.triangularView<Eigen::Lower>().solve(kept);
+      const Eigen::LLT<MatrixXd> information(known.transpose() * known);
+      best.root = information.matrixL().solve(kept.transpose()).transpose();
+    }
     best.evidence = fitted(problem, error, best.root, best.evidence.shares);
   }
   best.values = best.root * best.evidence.estimate.head(best.root.cols());
