@@ -13,7 +13,8 @@ SpecimenCurve::SpecimenCurve(std::vector<Point> points)
 SpecimenCurve::Value SpecimenCurve::at(double volume_mL) const {
   const double place = (volume_mL - points_.front().volume_mL) * per_mL_;
   const double last = static_cast<double>(points_.size() - 2);
-  const Point& left = points_[static_cast<size_t>(std::clamp(place, 0.0, last))];
+  // Not a number, as of a simulation that diverged, is found in the first interval, and stays none.
+  const Point& left = points_[static_cast<size_t>(place > 0.0 ? std::min(place, last) : 0.0)];
   const Point& right = *(&left + 1);
   const double s = (volume_mL - left.volume_mL) * per_mL_;
   if (s < 0.0)
