@@ -136,7 +136,9 @@ EvidenceFit solve(const VectorXd& z, const Eigen::MatrixXd& columns, const Model
     fit.log_evidence -= 0.5 * sigma * sigma;
   if (curvature == nullptr) return fit;
   // The inverse of D + K K' times z is left / D; its diagonal is 1/D less what the columns take.
-  const Eigen::MatrixXd explained = factor.matrixL().solve(weighted.transpose());
+  Eigen::MatrixXd explained = weighted.transpose();
+  if (explained.size() > 0)
+    factor.matrixL().solveInPlace(explained);  // nothing: a single waveform has no others
   for (Index i = 0; i < z.size(); ++i) {
     const auto g = static_cast<size_t>(error.group[static_cast<size_t>(i)]);
     const double models = square(shares[g]) * error.unit[i];

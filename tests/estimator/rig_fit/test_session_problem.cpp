@@ -177,8 +177,7 @@ TEST(SessionProblem, ItsStepsErrByFarLessThanTheModel) {
       SessionModel with = base;
       if (one.id != nullptr) {
         with.terms = {{find_effect(one.id), {}}};
-        for (const EffectParameter& parameter : find_effect(one.id)->parameters())
-          with.values.push_back(parameter.neutral);
+        with.values = find_effect(one.id)->neutral(problem.model(base));
         with.values[0] = one.value;
       }
       const auto errors = error_of_steps(problem, with);
