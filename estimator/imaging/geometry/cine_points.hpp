@@ -2,7 +2,8 @@
 // Guide points found in the cine images themselves: bright blood inside a darker wall, which differs from what is around it.
 //
 // From a centre in the blood rays go out in the image's plane; the inner wall is where the grey value falls through the mean of blood and
-// wall, the outer where it leaves the wall's towards the surroundings', both between pixels. A ray without a wall of 3 to 25 mm shows
+// wall, the outer where it leaves the wall's towards the surroundings', both between pixels and by what is seen on that ray, since coils
+// shade images. A ray without a wall of 3 to 25 mm shows
 // none, as above the base. The base is where the wall ends on the way up through its middle, in long-axis images.
 //
 // Centres lie on the axis and follow the contours. Short-axis contours that are inclined by more than 27 degrees to

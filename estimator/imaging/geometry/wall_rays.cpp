@@ -1,5 +1,7 @@
 #include "estimator/imaging/geometry/wall_rays.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace diastole::imaging {
@@ -18,6 +20,20 @@ std::optional<double> grey_at(const CineSlice& slice, const Eigen::ArrayXXd& ima
   const double u = column - static_cast<double>(c), v = row - static_cast<double>(r);
   return (1 - v) * ((1 - u) * image(r, c) + u * image(r, c + 1)) +
          v * ((1 - u) * image(r + 1, c) + u * image(r + 1, c + 1));
+}
+
+size_t sample_after(double mm) { return static_cast<size_t>(std::max(0.0, mm) / ray_step_mm) + 1; }
+
+/// Nothing where the profile does not reach.
+std::optional<double> mean_between(const std::vector<double>& profile, double from_mm, double to_mm) {
+  double sum = 0, count = 0;
+  for (size_t i = from_mm > 0 ? sample_after(from_mm) : 0;
+       i < profile.size() && ray_step_mm * static_cast<double>(i) < to_mm; ++i) {
+    sum += profile[i];
+    count += 1;
+  }
+  if (count == 0) return {};
+  return sum / count;
 }
 
 }  // namespace
@@ -41,23 +57,35 @@ std::vector<double> profile_of(const CineSlice& slice, const Eigen::ArrayXXd& im
   return profile;
 }
 
+namespace {
+
+/// Where a profile falls through the middle of what is seen to either side of an edge; nothing where it does not between two places.
+std::optional<double> half_way(const std::vector<double>& profile, const std::array<double, 2>& between_mm,
+                               std::optional<double> inside, std::optional<double> outside) {
+  if (!inside || !outside || *inside <= *outside) return {};
+  const std::optional<double> edge =
+      falls_through(profile, 0.5 * (*inside + *outside), sample_after(between_mm[0]));
+  return edge && *edge < between_mm[1] ? edge : std::nullopt;
+}
+
+}  // namespace
+
 std::optional<WallOnRay> wall_on_ray(const CineSlice& slice, const std::vector<double>& profile) {
   const GreyLevels& levels = slice.levels;
   if (profile.empty() || profile[0] < levels.inner()) return {};
   const std::optional<double> inner = falls_through(profile, levels.inner(), 0);
   if (!inner) return {};
-  const auto after = static_cast<size_t>(*inner / ray_step_mm) + 1;
-  const std::optional<double> outer = falls_through(profile, levels.outer(), after);
+  const std::optional<double> outer = falls_through(profile, levels.outer(), sample_after(*inner));
   if (!outer || *outer - *inner < least_wall_mm || *outer - *inner > most_wall_mm) return {};
-  // Between the two it is a wall: its middle half has the wall's level.
-  double sum = 0, count = 0;
-  for (size_t i = after; i < profile.size(); ++i) {
-    const double part = (ray_step_mm * static_cast<double>(i) - *inner) / (*outer - *inner);
-    if (part < 0.35 || part > 0.65) continue;
-    sum += profile[i];
-    count += 1;
-  }
-  if (count == 0 || sum / count > levels.inner() || sum / count < levels.outer()) return {};
-  return WallOnRay{*inner, *outer};
+  // Between the two it is a wall: its middle third has the wall's level.
+  const double third = (*outer - *inner) / 3;
+  const std::optional<double> wall = mean_between(profile, *inner + third, *outer - third);
+  if (!wall || *wall > levels.inner() || *wall < levels.outer()) return {};
+  const double blur_mm = 1.5 * std::max(slice.plane.column_spacing_mm, slice.plane.row_spacing_mm);
+  const std::optional<double> blood = mean_between(profile, *inner - 2 * blur_mm, *inner - blur_mm);
+  const std::optional<double> around = mean_between(profile, *outer + blur_mm, *outer + 2 * blur_mm);
+  return WallOnRay{half_way(profile, {*inner - blur_mm, *inner + third}, blood, wall).value_or(*inner),
+                   half_way(profile, {*outer - third, *outer + blur_mm}, wall, around).value_or(*outer)};
 }
+
 }  // namespace diastole::imaging

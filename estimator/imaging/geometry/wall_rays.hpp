@@ -23,7 +23,8 @@ struct WallOnRay {
   double inner_mm, outer_mm;
 };
 
-/// From blood through a wall of 3 to 25 mm to its surroundings; nothing where the profile is another.
+/// From blood through a wall of 3 to 25 mm to its surroundings; nothing where the profile is another. Found by the slice's grey levels, its
+/// edges then lie half way between those of this ray: by the slice's alone, coils would displace all contours towards their bright side.
 std::optional<WallOnRay> wall_on_ray(const CineSlice& slice, const std::vector<double>& profile);
 
 }  // namespace diastole::imaging

@@ -4,6 +4,9 @@
 
 #include <cmath>
 #include <filesystem>
+#include <map>
+#include <string>
+#include <utility>
 
 #include "estimator/imaging/diffusion/tensor_fit.hpp"
 #include "estimator/imaging/geometry/cine_points.hpp"
@@ -55,6 +58,30 @@ TEST_F(VentricleScan, WallsAndBaseAreFoundInItsCines) {
   }
   EXPECT_GT(base, 40);
   EXPECT_GT(walls, 300);
+}
+
+TEST_F(VentricleScan, CoilsThatShadeDisplaceNoContour) {
+  protocol_.shading = 0.6;
+  scan_phases(4);
+  const imaging::GuidePoints guide =
+      imaging::cine_guide_points(imaging::read_cines(imaging::read_image_folder(scratch_.path())));
+  struct Contour {
+    Eigen::Vector2d sum_mm = Eigen::Vector2d::Zero();
+    int points = 0;
+  };
+  std::map<std::pair<std::string, imaging::GuideSurface>, Contour> contours;
+  for (const imaging::GuidePoint& point : guide.points) {
+    if (point.phase > 0 || !guide.slices[point.slice].starts_with("sa")) continue;
+    Contour& contour = contours[{guide.slices[point.slice], point.surface}];
+    contour.sum_mm += point.place_mm.head<2>();
+    ++contour.points;
+  }
+  ASSERT_GE(contours.size(), 6U);
+  for (const auto& [place, contour] : contours) {
+    EXPECT_EQ(contour.points, 24) << place.first;
+    EXPECT_LT((contour.sum_mm / contour.points).norm(), 0.1)
+        << place.first << " of the round ventricle's axis";
+  }
 }
 
 /// Mean distance of the inner wall's points from the axis, by phase.
