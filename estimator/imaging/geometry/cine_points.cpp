@@ -9,6 +9,8 @@
 #include <numbers>
 #include <optional>
 
+#include "estimator/imaging/geometry/slab_edges.hpp"
+#include "estimator/imaging/geometry/ventricle_fit.hpp"
 #include "estimator/imaging/geometry/wall_rays.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -21,6 +23,8 @@ using Eigen::Vector3d;
 constexpr int rays = 24;
 /// Of an edge between pixels where noise is a few per cent of the contrast; the fit finds its true size.
 constexpr double edge_sigma_mm = 0.4;
+/// Between rows across the axis in long-axis images.
+constexpr double row_step_mm = 2.5;
 
 struct Contour {
   std::vector<Vector2d> inner, outer;  // in-plane mm
@@ -152,7 +156,7 @@ class CineFinder {
     const Vector2d across(-up.y(), up.x());
     std::array<std::vector<WallOnRay>, 2> side;
     std::array<std::vector<double>, 2> height;
-    for (double h = -0.5 * apex->inner_mm; h < ray_mm; h += 5) {
+    for (double h = -0.5 * apex->inner_mm; h < ray_mm; h += row_step_mm) {
       for (size_t k = 0; k < 2; ++k) {
         const Vector2d direction = k == 0 ? across : Vector2d(-across);
         const std::optional<WallOnRay> wall =
@@ -175,8 +179,8 @@ class CineFinder {
     }
     for (size_t k = 0; k < 2; ++k) {
       const Vector2d direction = k == 0 ? across : Vector2d(-across);
-      // The last row may be blurred with what is above the base.
-      for (size_t i = 0; i + 1 < side[k].size(); ++i) {
+      // The last two rows, less than 5 to 7 mm below the wall's end, are blurred with what is above the base.
+      for (size_t i = 0; i + 2 < side[k].size(); ++i) {
         const Vector2d on_axis = middle + height[k][i] * up;
         add(phase, s, GuideSurface::endo, on_axis + side[k][i].inner_mm * direction);
         add(phase, s, GuideSurface::epi, on_axis + side[k][i].outer_mm * direction);
@@ -204,6 +208,17 @@ class CineFinder {
 
 }  // namespace
 
-GuidePoints cine_guide_points(const Cines& cines) { return CineFinder(cines).found(); }
+GuidePoints cine_guide_points(const Cines& cines) {
+  GuidePoints points = CineFinder(cines).found();
+  std::vector<SlicePlane> planes;
+  for (const CineSlice& slice : cines.slices)
+    planes.push_back(slice.plane);
+  try {
+    move_to_mid_slice(points, fit_ventricle(points), planes);
+  } catch (const InputError&) {
+    // Who fits these points gets to know why they make no ventricle.
+  }
+  return points;
+}
 
 }  // namespace diastole::imaging

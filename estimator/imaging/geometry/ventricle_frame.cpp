@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 
 #include "protocol/contract/input_error.hpp"
 
@@ -127,7 +130,7 @@ VentricleFrame ventricle_frame(const GuidePoints& guide, const std::vector<Guide
     frame.axes = axes_about(axis.normalized());
   }
   q = fitted_quadrics(guide, frame);
-  double height = 0, focus_square = 0;
+  double height = 0, focus_square = std::numeric_limits<double>::infinity();
   std::array<double, 2> long_axis{};
   for (size_t wall = 0; wall < 2; ++wall) {
     const Vector3d s = q.segment<3>(wall == 0 ? 0 : 3);
@@ -141,10 +144,11 @@ VentricleFrame ventricle_frame(const GuidePoints& guide, const std::vector<Guide
     const double across_square = s[0] - s[2] * centre * centre;
     long_axis[wall] = std::sqrt(std::max(0.0, across_square / -s[2]));
     height += centre / 2;
-    focus_square += (long_axis[wall] * long_axis[wall] - across_square) / 2;
+    focus_square = std::min(focus_square, long_axis[wall] * long_axis[wall] - across_square);
   }
   frame.origin_mm = frame.patient({0, 0, height});
-  // Coordinates about a sphere have no focus; with a third of the axis they do for one.
+  // At a focus coordinates are singular: with the farther wall's the nearer one's apex would have no smooth lambda. Coordinates about a
+  // sphere have no focus; with a third of the axis they do for one.
   frame.focus_mm = std::sqrt(std::max(focus_square, long_axis[0] * long_axis[0] / 9));
   const auto lambda = [&](double axis_mm) { return std::acosh(std::max(1.01, axis_mm / frame.focus_mm)); };
   found.inner_lambda = lambda(long_axis[0]);

@@ -83,6 +83,21 @@ TEST(Ventricle, ClicksWithoutErrorGiveTheWallsBack) {
   EXPECT_GT(session.phases[0].mesh.least_jacobian, 0.5);
 }
 
+TEST(Ventricle, ItsApexIsFoundWhereTheOuterWallsFocusLiesBeyondIt) {
+  VentriclePhantom truth;
+  truth.inner_across_mm = 21;
+  truth.inner_along_mm = 51;
+  truth.wall_along_mm = 9;
+  const VentricleFit fit = measured(click(truth, {.sigma_mm = 0, .clicks = 16}).guide_csv).fit;
+  const WallMap map(fit.frame, fit.phases[0]);
+  for (const bool is_inner : {true, false}) {
+    const std::vector<Eigen::Vector3d> wall_mm = truth.surface_mm(is_inner ? 0 : 1, 0);
+    const Eigen::Vector3d apex_mm = *std::ranges::min_element(
+        wall_mm, {}, [&](const Eigen::Vector3d& x) { return fit.frame.inside(x).z(); });
+    EXPECT_NEAR(map.distance_mm(is_inner ? -0.5 : 0.5, fit.frame.inside(apex_mm)), 0, 0.2) << is_inner;
+  }
+}
+
 TEST(Ventricle, IsMeasuredInEveryPhaseFromClicksOfHalfAMillimetre) {
   const VentriclePhantom truth = bent();
   const Clicks clicks = click(truth, {.phases = 10});

@@ -10,6 +10,8 @@
 
 #include "estimator/imaging/diffusion/tensor_fit.hpp"
 #include "estimator/imaging/geometry/cine_points.hpp"
+#include "estimator/imaging/geometry/ventricle_fit.hpp"
+#include "estimator/imaging/geometry/wall_map.hpp"
 #include "estimator/imaging/series/image_folder.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 #include "tests/tools/sim_scanner/scanned_ventricle.hpp"
@@ -81,6 +83,33 @@ TEST_F(VentricleScan, CoilsThatShadeDisplaceNoContour) {
     EXPECT_EQ(contour.points, 24) << place.first;
     EXPECT_LT((contour.sum_mm / contour.points).norm(), 0.1)
         << place.first << " of the round ventricle's axis";
+  }
+}
+
+TEST_F(VentricleScan, WallsFittedToItsCinesAreTrueFromApexToBase) {
+  scan_phases(4);
+  const imaging::VentricleFit fit = imaging::fit_ventricle(
+      imaging::cine_guide_points(imaging::read_cines(imaging::read_image_folder(scratch_.path()))));
+  const imaging::WallMap map(fit.frame, fit.phases[0]);
+  for (const bool is_inner : {true, false}) {
+    const auto& axes_mm = is_inner ? shape_.inner_axes_mm : shape_.outer_axes_mm;
+    const auto error_mm = [&](double mu, double theta) {
+      const double across_mm = axes_mm[0] * std::sin(mu);
+      return map.distance_mm(is_inner ? -0.5 : 0.5,
+                             fit.frame.inside({across_mm * std::cos(theta), across_mm * std::sin(theta),
+                                               -axes_mm[1] * std::cos(mu)}));
+    };
+    double sum = 0, squares = 0, count = 0;
+    for (double mu = 0.1; - axes_mm[1] * std::cos(mu) < shape_.base_z_mm; mu += 0.1)
+      for (double theta = 0; theta < 6; theta += 0.5) {
+        const double error = error_mm(mu, theta);
+        sum += error;
+        squares += error * error;
+        count += 1;
+      }
+    // A tenth of a pixel on average.
+    EXPECT_NEAR(sum / count, 0, 0.1) << is_inner;
+    EXPECT_LT(std::sqrt(squares / count), 0.15) << is_inner;
   }
 }
 
