@@ -139,7 +139,7 @@ void add_effects(CommandLine& line) {
       "explain --with FILE` lets it compete. docs/effects-as-files.md says how such a file is written.");
   command->add_option("ID", *id, "an effect, for example hose-compliance, or a file NAME.effect.toml");
   command->add_option("--threads", *threads, "simulations at a time")
-      ->check(CLI::Range(1, 256))
+      ->check(number_between(1, 256))
       ->capture_default_str();
   line.on_run(command, [id, threads](const CommandOutput& out) { return run_effects(*id, *threads, out); });
 }

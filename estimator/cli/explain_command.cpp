@@ -277,7 +277,7 @@ void add_explain(CommandLine& line, const ExplanationScorer& score) {
       ->check(CLI::ExistingFile);
   command->add_option("--score", arguments->truths, "compare explanations with what was hidden");
   command->add_option("--threads", arguments->threads, "simulations at a time")
-      ->check(CLI::Range(1, 256))
+      ->check(number_between(1, 256))
       ->capture_default_str();
   command->add_flag(
       "--learn", arguments->learn,

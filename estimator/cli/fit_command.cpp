@@ -304,11 +304,11 @@ void add_fit(CommandLine& line) {
   command
       ->add_option("--fibre-sigma-deg", arguments->fibre_sigma_deg,
                    "fibres may be off by a common angle of this standard deviation: the errors then hold it")
-      ->check(CLI::Range(0.0, 45.0));
+      ->check(number_between(0.0, 45.0));
   command
       ->add_option("--geometry-sigma-mm", arguments->geometry_sigma_mm,
                    "the walls may lie off their places by as much: likewise")
-      ->check(CLI::Range(0.0, 10.0));
+      ->check(number_between(0.0, 10.0));
   command->add_flag(
       "--finer-mesh", arguments->finer_mesh,
       "correct the motion by what twice as many elements each way change at the estimate, and fit "
@@ -324,7 +324,7 @@ void add_fit(CommandLine& line) {
   command
       ->add_option("--posterior", arguments->posterior_draws,
                    "draw the posterior so often, from the full model: some seconds to minutes a hundred")
-      ->check(CLI::Range(40, 1000000));
+      ->check(number_between(40, 1000000));
   command->add_option("--start", arguments->start, "start from an earlier result or checkpoint");
   command->add_option("--checkpoint", arguments->checkpoint, "keep what each step reached in this file");
   command->add_flag("--resume", arguments->resume, "go on from the checkpoint, if there is one")
@@ -333,7 +333,7 @@ void add_fit(CommandLine& line) {
                       "keep the result in this file, for `diastole report`");
   command->add_flag("--force", arguments->force, "replace an output file that is no fit result");
   command->add_option("--iterations", arguments->iteration_limit, "stop after so many steps")
-      ->check(CLI::Range(1, 1000))
+      ->check(number_between(1, 1000))
       ->capture_default_str();
   line.on_run(command, [arguments](const CommandOutput& out) { return run_fit(*arguments, out); });
 }

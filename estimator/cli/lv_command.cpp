@@ -249,7 +249,7 @@ void add_ventricle(CommandLine& line) {
   command
       ->add_option("--fibre-deg", a.fibre_deg,
                    "fibre angle at the endocardium and at the epicardium, for laws with fibres")
-      ->check(CLI::Range(-90.0, 90.0))
+      ->check(number_between(-90.0, 90.0))
       ->delimiter(',')
       ->expected(2);
   command->add_option("--guide", a.guide,

@@ -271,9 +271,9 @@ void add_montecarlo(CommandLine& line) {
           "and six long-axis images, a 3-D point a pixel along each stripe, as in the paper")
       ->delimiter(',')
       ->expected(2)
-      ->check(CLI::Range(0.05, 100.0));
+      ->check(number_between(0.05, 100.0));
   command->add_option("--repeats", arguments->repeats, "refits of each noise and number of frames")
-      ->check(CLI::Range(2, 100000))
+      ->check(number_between(2, 100000))
       ->capture_default_str();
   command->add_option("--at", arguments->at, "true values from a result of `diastole fit -o`");
   command->add_flag("--exact-pressures", arguments->exact_pressures,

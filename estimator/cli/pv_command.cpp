@@ -184,7 +184,7 @@ void add_pressure_volume(CommandLine& line) {
                    "volume that the cavity takes at the end")
       ->required();
   command->add_option("--steps", arguments->steps, "equal steps of volume")
-      ->check(CLI::Range(1, 10000))
+      ->check(number_between(1, 10000))
       ->capture_default_str();
   arguments->outputs.add_options(*command, "page (.html) or table (.csv) to write");
   line.on_run(command, [arguments](const CommandOutput& out) { return run_pv(*arguments, out); });

@@ -138,15 +138,15 @@ void add_reconstruct(CommandLine& line) {
   command
       ->add_option("--points", arguments->points,
                    "points a frame in the .csv [as many as the field has freedoms / 3]")
-      ->check(CLI::Range(1, 1'000'000));
+      ->check(number_between(1, 1'000'000));
   command->add_option("--lambda", arguments->lambda, "smoothing weight, instead of cross-validation")
-      ->check(CLI::Range(1e-6, 1e12));
+      ->check(number_between(1e-6, 1e12));
   command
       ->add_option("--smoothing", arguments->smoothing,
                    "weights of first and second derivatives in the smoothness, as 0.02,1")
       ->delimiter(',')
       ->expected(2)
-      ->check(CLI::Range(0.0, 1e6));
+      ->check(number_between(0.0, 1e6));
   command->add_flag("--keep-wild", arguments->plain, "plain least squares: leave no wild point out");
   command->add_flag("--no-stiffness", arguments->skip_stiffness,
                     "skip the forward model that tests the pressures' unit");

@@ -114,7 +114,7 @@ void add_reference(CommandLine& line) {
   command->add_option("-o,--output", arguments->output, "file for the result, rig.reference.json say")
       ->required();
   command->add_option("--threads", arguments->threads, "simulations at a time")
-      ->check(CLI::Range(1, 256))
+      ->check(number_between(1, 256))
       ->capture_default_str();
   command->add_flag("--force", arguments->force, "replace a file that holds something else");
   line.on_run(command, [arguments](const CommandOutput& out) { return run_reference(*arguments, out); });

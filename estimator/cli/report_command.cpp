@@ -50,7 +50,7 @@ void add_report(CommandLine& line) {
   command->add_option("-o,--output", arguments->page, "the HTML page to write")->required();
   command->add_flag("--force", arguments->force, "replace an output file that is no report");
   command->add_option("--frames", arguments->frames, "image frames of a cycle")
-      ->check(CLI::Range(1, 1000))
+      ->check(number_between(1, 1000))
       ->capture_default_str();
   line.on_run(command, [arguments](const CommandOutput& out) { return run_report(*arguments, out); });
 }

@@ -221,11 +221,11 @@ void add_bin(CommandLine& line) {
   command
       ->add_option("--frames", options->frames,
                    "frames in a cycle; default: as the run's schedule plans, else 16")
-      ->check(CLI::Range(1, 10000));
+      ->check(number_between(1, 10000));
   auto* times = command->add_option("--frame-times", options->frame_times,
                                     "CSV with trigger_time_ms and perhaps width_ms, one row a frame");
   auto* tr = command->add_option("--tr-ms", options->tr_ms, "frames begin this far apart")
-                 ->check(CLI::Range(0.001, 1e6));
+                 ->check(number_between(0.001, 1e6));
   command->add_option("--first-ms", options->first_ms, "the first frame begins this long after the trigger")
       ->needs(tr);
   auto* window =
@@ -233,9 +233,9 @@ void add_bin(CommandLine& line) {
   times->excludes(tr)->excludes(window);
   tr->excludes(window);
   command->add_option("--width-ms", options->width_ms, "a frame's length, instead of to the next frame")
-      ->check(CLI::Range(0.001, 1e6));
+      ->check(number_between(0.001, 1e6));
   command->add_option("--gate-every", options->gate_every, "the scanner takes every n-th R-wave")
-      ->check(CLI::Range(1, 10000));
+      ->check(number_between(1, 10000));
   command->add_option("--delay-ms", options->delay_ms,
                       "delay of the signal to remove, or \"run\": what the run file tells");
   command->add_option("--segment", options->segment,

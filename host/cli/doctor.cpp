@@ -105,7 +105,7 @@ void add_doctor(CommandLine& line) {
                  "print udev rules for the rig file's devices, and no more")
       ->needs(config);
   command->add_option("--latency-s", options->latency_s, "how long to measure")
-      ->check(CLI::Range(0.1, 600.0))
+      ->check(number_between(0.1, 600.0))
       ->capture_default_str();
   line.on_run(command, [options](const CommandOutput& out) { return doctor(*options, out); });
 }

@@ -52,7 +52,7 @@ void add_self_test(CommandLine& line) {
                "check failed; what to do stands below it.");
   command->add_option("--seconds", options->seconds, "how long the clocks are compared")
       ->capture_default_str()
-      ->check(CLI::Range(2.0, 600.0));
+      ->check(number_between(2.0, 600.0));
   options->daemon.add_to(*command);
   options->daemon.add_take_over_to(*command);
   line.on_run(command, [options](const CommandOutput& out) {

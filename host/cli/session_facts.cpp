@@ -47,7 +47,7 @@ void add_facts_to(CLI::App& command, SessionFacts& facts) {
   command.add_option("--specimen", facts.specimen, "name of the specimen, kept in the run file");
   command.add_option("--operator", facts.operator_name, "who does the session");
   command.add_option("--room-temperature-C", facts.room_temperature_C, "temperature of the room")
-      ->check(CLI::Range(coldest_C, warmest_C));
+      ->check(number_between(coldest_C, warmest_C));
   command.add_option("--note", facts.notes, "a remark; may be repeated, and `diastole note` adds more later");
 }
 

@@ -20,6 +20,7 @@
 #include <cstdlib>
 #include <functional>
 #include <optional>
+#include <sstream>
 #include <string>
 
 #include "protocol/contract/exit_code.hpp"
@@ -37,7 +38,7 @@ inline std::optional<double> number_of(const std::string& text) {
   return text.empty() || *end != '\0' ? std::nullopt : std::optional(number);
 }
 
-/// For options, instead of CLI11's, which report the largest number that there is. What is no number is refused when it is converted.
+/// For options, instead of CLI11's, which report the largest number that there is, or six decimals. What is no number is refused when it is converted.
 inline const CLI::Validator positive_number(
     [](const std::string& text) {
       return number_of(text).value_or(1.0) <= 0.0 ? text + " is not above zero" : "";
@@ -48,6 +49,17 @@ inline const CLI::Validator nonnegative_number(
       return number_of(text).value_or(0.0) < 0.0 ? text + " is below zero" : "";
     },
     "NONNEGATIVE");
+template <class Number>
+CLI::Validator number_between(Number low, Number high) {
+  std::ostringstream range;
+  range << low << " to " << high;
+  return {[low, high, range = range.str()](const std::string& text) {
+            const double number = number_of(text).value_or(static_cast<double>(low));
+            const bool is_between = number >= static_cast<double>(low) && number <= static_cast<double>(high);
+            return is_between ? "" : text + " is not from " + range;
+          },
+          range.str()};
+}
 
 class CommandLine {
  public:

@@ -450,6 +450,10 @@ TEST(BadOption, IsToldWithItsNameItsValueAndWhatIsExpected) {
               HasSubstr("--period: \"1,2\" is not a number"));
   EXPECT_THAT(reported({"diastole", "scan", "gel.study.toml", "-o", "scan", "--period", "-1"}),
               HasSubstr("--period: -1 is not above zero"));
+  EXPECT_THAT(reported({"diastole", "fit", "gel.study.toml", "--geometry-sigma-mm", "0,25"}),
+              HasSubstr("--geometry-sigma-mm: \"0,25\" is not a number"));
+  EXPECT_THAT(reported({"diastole", "fit", "gel.study.toml", "--geometry-sigma-mm", "10.5"}),
+              HasSubstr("--geometry-sigma-mm: 10.5 is not from 0 to 10"));
   EXPECT_THAT(reported({"diastole", "jog", "--mL", "5mL"}), HasSubstr("--mL: \"5mL\" is not a number"));
   EXPECT_THAT(reported({"diastole", "fit", "gel.study.toml", "--unexamind"}),
               testing::AllOf(HasSubstr("not expected: --unexamind. Did you mean \"--unexamined\"?"),

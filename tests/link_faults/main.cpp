@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "protocol/contract/command.hpp"
 #include "tests/link_faults/proxy.hpp"
 #include "tools/program/program.hpp"
 
@@ -30,7 +31,7 @@ void add_options(CLI::App& app, diastole::link_faults::ProxyOptions& options,
   app.add_option("--baud", options.baud, "of the controller's port")->capture_default_str();
   app.add_option("--seed", options.seed, "equal seeds and traffic give equal faults")->capture_default_str();
   const auto rate = [&app](const char* name, double& value, const char* what) {
-    app.add_option(name, value, what)->check(CLI::Range(0.0, 1.0))->capture_default_str();
+    app.add_option(name, value, what)->check(diastole::number_between(0.0, 1.0))->capture_default_str();
   };
   rate("--bit-error", rates.bit_error, "of each bit: is flipped");
   rate("--byte-loss", rates.byte_loss, "of each byte: is missing");
@@ -44,7 +45,7 @@ void add_options(CLI::App& app, diastole::link_faults::ProxyOptions& options,
       ->check(CLI::IsMember({"both", "to-controller", "to-host"}))
       ->capture_default_str();
   app.add_option("--seconds", options.seconds, "end after this time (default: run until Ctrl-C)")
-      ->check(CLI::PositiveNumber);
+      ->check(diastole::positive_number);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "protocol/contract/command.hpp"
 #include "protocol/contract/exit_code.hpp"
 #include "protocol/contract/json_text.hpp"
 #include "tools/program/program.hpp"
@@ -47,7 +48,7 @@ void add_options(CLI::App& app, diastole::SessionOptions& options, bool& report,
   app.add_flag("--real-time", options.real_time,
                "follow the wall clock; without it, as fast as the machine goes");
   app.add_option("--seconds", options.seconds, "end after this much board time (default: run until Ctrl-C)")
-      ->check(CLI::PositiveNumber);
+      ->check(diastole::positive_number);
   app.add_option(
       "--estop-at", options.estop_at,
       "press the e-stop at this time in seconds, or from one to another: 2.5 or 2.5..4; may be repeated");
@@ -56,7 +57,7 @@ void add_options(CLI::App& app, diastole::SessionOptions& options, bool& report,
   app.add_flag("--loop-back", options.loop_back, "put the wires of `diastole selftest` on");
   app.add_option("--power-cut", options.power_cut,
                  "cut the power in the middle of flash operation N (1 is the first)")
-      ->check(CLI::PositiveNumber);
+      ->check(diastole::positive_number);
   app.add_option("--crystal-Hz", options.crystal_Hz,
                  "the board's crystal (Olimex H405 8 MHz, Feather F405 12 MHz)")
       ->capture_default_str();

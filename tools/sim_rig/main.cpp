@@ -8,6 +8,7 @@
 #include <fstream>
 #include <optional>
 
+#include "protocol/contract/command.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tools/program/program.hpp"
 #include "tools/sim_board/emulated_controller.hpp"
@@ -88,7 +89,7 @@ void add_options(CLI::App& app, Arguments& arguments) {
   app.add_option("--play", arguments.server.play, "let the instrument show this recorded run's pressure");
   app.add_option("--host-drift-ppm", arguments.server.host_drift_ppm,
                  "with --conductor: let the daemon's clock run this much fast")
-      ->check(CLI::Range(-1000.0, 1000.0));
+      ->check(diastole::number_between(-1000.0, 1000.0));
   app.add_option("--seed", arguments.seed, "of the sensors' noise")->capture_default_str();
   app.add_option("--rig-seed", arguments.rig_seed,
                  "draw a rig whose parts are off by what such parts are off by; 0: as the rig file has it")

@@ -123,7 +123,7 @@ void add_compare(CommandLine& line) {
       ->required();
   command->add_option("-o,--output", options->page, "HTML page with plots to write");
   command->add_option("--parts", options->parts, "into which a cycle is divided")
-      ->check(CLI::Range(4, 1000))
+      ->check(number_between(4, 1000))
       ->capture_default_str();
   command->add_flag("--force", options->force, "replace an output file that is no report");
   line.on_run(command, [options](const CommandOutput& out) { return compare_runs(*options, out); });

@@ -128,7 +128,7 @@ void add_desk(CommandLine& line) {
       ->check(CLI::IsMember({"auto", "specimen", "patient"}))
       ->capture_default_str()
       ->excludes(guide);
-  command->add_option("--port", a.port, "of 127.0.0.1 [any free one]")->check(CLI::Range(0, 65535));
+  command->add_option("--port", a.port, "of 127.0.0.1 [any free one]")->check(number_between(0, 65535));
   command->add_flag("--no-browser", a.no_browser, "print the address only");
   command->add_flag("--force", a.force, "replace an output file that is none of track's");
   line.on_run(command, [arguments](const CommandOutput& out) { return run_desk(*arguments, out); });

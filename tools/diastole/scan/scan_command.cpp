@@ -382,10 +382,10 @@ void add_protocol(CLI::App& command, scanner::ScanProtocol& protocol) {
       ->check(positive_number)
       ->capture_default_str();
   command.add_option("--matrix", protocol.matrix, "pixels each way")
-      ->check(CLI::Range(32, 512))
+      ->check(number_between(32, 512))
       ->capture_default_str();
   command.add_option("--acquired", protocol.acquired, "share of the phase-encoding lines that is measured")
-      ->check(CLI::Range(0.3, 1.0))
+      ->check(number_between(0.3, 1.0))
       ->capture_default_str();
   command.add_option("--thickness", protocol.thickness_mm, "of a slice, mm")
       ->check(positive_number)
@@ -408,7 +408,7 @@ void add_protocol(CLI::App& command, scanner::ScanProtocol& protocol) {
       ->capture_default_str();
   command.add_option("--T1", protocol.T1_s, "of tissue, s")->check(positive_number)->capture_default_str();
   command.add_option("--shading", protocol.shading, "of the coils, from corner to corner")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(number_between(0.0, 1.0))
       ->capture_default_str();
   command.add_flag("--cine", protocol.cine, "series without tags, too");
   command.add_flag("--dark-bath", protocol.dark_bath,
@@ -439,7 +439,7 @@ void add_scan(CommandLine& line) {
       "--flow", a.flow,
       "phase contrast of the tube that fills the specimen, too; the frames must go through a whole cycle");
   command->add_option("--bore", a.bore_mm, "of that tube, mm")
-      ->check(CLI::Range(4.0, 40.0))
+      ->check(number_between(4.0, 40.0))
       ->capture_default_str();
   command->add_option("--venc", a.venc_cm_s, "of the phase contrast, cm/s")
       ->check(positive_number)
@@ -450,7 +450,9 @@ void add_scan(CommandLine& line) {
       ->add_option("--peak-kPa", a.peak_kPa,
                    "a parabolic cycle up to this pressure, instead of the study's frames")
       ->check(positive_number);
-  command->add_option("--phases", a.phases, "of that cycle")->check(CLI::Range(1, 64))->capture_default_str();
+  command->add_option("--phases", a.phases, "of that cycle")
+      ->check(number_between(1, 64))
+      ->capture_default_str();
   command
       ->add_option("--period", a.period_s,
                    "of the cycle, s: 1.2 for a parabolic one, else what the frames span")

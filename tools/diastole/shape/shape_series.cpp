@@ -40,7 +40,7 @@ void add_request_to(CLI::App& command, ShapeRequest& request) {
       ->check(positive_number);
   command.add_option("--cycles", request.plan.cycles, "of a run, the first three of which set in")
       ->capture_default_str()
-      ->check(CLI::Range(1, 1000));
+      ->check(number_between(1, 1000));
 }
 
 namespace {
@@ -66,7 +66,7 @@ class ShapeSeries final : public SessionSeries {
     const size_t before = command.get_options().size();
     add_request_to(command, request_);
     command.add_option("--iterations", iterations_, "sessions at the most")
-        ->check(CLI::Range(size_t{1}, most_iterations))
+        ->check(number_between(size_t{1}, most_iterations))
         ->capture_default_str();
     command.add_option("--page", page_, "HTML page with the plots of each iteration");
     const std::vector<CLI::Option*> all = command.get_options();

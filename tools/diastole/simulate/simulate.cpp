@@ -286,7 +286,7 @@ void add_simulate(CommandLine& line, std::shared_ptr<SessionSeries> series) {
   command
       ->add_option("--gated-volume", options->gated_sd_mL,
                    "also measure the cavity's volume as gated imaging does (/mr/flow), with this sd in mL")
-      ->check(CLI::Range(1e-3, 100.0));
+      ->check(number_between(1e-3, 100.0));
   add_facts_to(*command, options->session.facts);
   command->add_flag("--real-time", options->rig.real_time, "as slow as the real thing");
   command->add_flag("--force", options->session.force, "replace files that exist");
