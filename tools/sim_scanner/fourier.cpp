@@ -3,6 +3,7 @@
 #include <fftw3.h>
 
 #include <mutex>
+#include <numbers>
 
 namespace diastole::scanner {
 
@@ -20,6 +21,25 @@ void transform(Spectrum& values, int sign) {
 
 double signed_line(Eigen::Index line, Eigen::Index count) {
   return static_cast<double>(2 * line > count ? line - count : line);
+}
+
+Spectrum measured_spectrum(Spectrum object, Eigen::Index samples_a_pixel) {
+  transform(object, -1);
+  const Eigen::Index fine = object.rows(), n = fine / samples_a_pixel;
+  const auto samples = static_cast<double>(samples_a_pixel);
+  Spectrum measured(n, n);
+  for (Eigen::Index column = 0; column < n; ++column) {
+    for (Eigen::Index row = 0; row < n; ++row) {
+      const double ky = signed_line(row, n), kx = signed_line(column, n);
+      const auto place = [&](double k) {
+        return static_cast<Eigen::Index>(k < 0 ? k + static_cast<double>(fine) : k);
+      };
+      const double turn = std::numbers::pi * (samples - 1) / static_cast<double>(fine) * (kx + ky);
+      measured(row, column) = std::complex<float>(std::complex<double>(object(place(ky), place(kx))) *
+                                                  std::polar(1.0, turn) / (samples * samples));
+    }
+  }
+  return measured;
 }
 
 }  // namespace diastole::scanner

@@ -54,23 +54,18 @@ Spectrum image_of(const Moment& moment, double share, std::mt19937& engine) {
       object(row, column) = std::complex<float>(moment.signal(from_middle(column), from_middle(row), share));
     }
   }
-  transform(object, -1);
   const int n = protocol.matrix;
-  Spectrum cut = Spectrum::Zero(n, n);
+  Spectrum cut = measured_spectrum(std::move(object), samples_a_pixel);
   const double half = 0.5 * protocol.acquired * n;
   std::normal_distribution<double> noise(0, n / protocol.snr);
   for (int column = 0; column < n; ++column) {
     for (int row = 0; row < n; ++row) {
-      const double ky = signed_line(row, n), kx = signed_line(column, n);
-      if (std::abs(kx) > half || std::abs(ky) > half) continue;
-      const auto place = [&](double k) { return static_cast<Eigen::Index>(k < 0 ? k + fine : k); };
-      // A pixel's centre lies in the middle of its samples.
-      const double turn = pi * (samples_a_pixel - 1.0) / fine * (kx + ky);
-      const std::complex<double> value = std::complex<double>(object(place(ky), place(kx))) *
-                                         std::polar(1.0, turn) /
-                                         static_cast<double>(samples_a_pixel * samples_a_pixel);
+      if (std::abs(signed_line(column, n)) > half || std::abs(signed_line(row, n)) > half) {
+        cut(row, column) = 0;
+        continue;
+      }
       const double imaginary = noise(engine), real = noise(engine);
-      cut(row, column) = std::complex<float>(value + std::complex<double>(real, imaginary));
+      cut(row, column) += std::complex<float>(std::complex<double>(real, imaginary));
     }
   }
   transform(cut, +1);

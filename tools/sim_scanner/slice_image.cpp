@@ -13,7 +13,7 @@
 namespace diastole::scanner {
 namespace {
 
-constexpr int in_plane_samples = 3, through_samples = 6;
+constexpr int through_samples = 6;
 constexpr double soft_edge = 0.15;                 // of the thickness: where the slice's profile falls
 constexpr double water_brightness = 0.65;          // beside tissue's, with tags
 constexpr double balanced_water_brightness = 1.8;  // without
@@ -21,6 +21,13 @@ constexpr double stirred_T_s = 0.08, bath_T1_s = 2.8;
 
 /// The profile across the slice, s in thicknesses from its middle.
 double profile(double s) { return 0.5 * (std::erf((s + 0.5) / soft_edge) - std::erf((s - 0.5) / soft_edge)); }
+
+/// Of a sample, in its own size: where within it layer s is looked at. No two layers share a row or a column, so that an edge along the pixels,
+/// as the plane of a base is, lies where it is to a sixth of a sample.
+std::array<double, 2> within_sample(int s) {
+  constexpr int generator = 5;  // coprime to the count
+  return {(generator * s % through_samples + 0.5) / through_samples - 0.5, (s + 0.5) / through_samples - 0.5};
+}
 
 class Signal {
  public:
@@ -72,7 +79,8 @@ class Signal {
 Picture signal_of(const SliceOfBody& body, const ScanPlane& plane, const ScanProtocol& protocol,
                   const std::vector<TagPlane>& tags, double time_s) {
   const Signal signal(protocol, tags, time_s);
-  const double pixel_mm = protocol.field_of_view_mm / protocol.matrix;
+  const int count = protocol.matrix * samples_a_pixel;
+  const double sample_mm = protocol.field_of_view_mm / count;
   std::array<double, through_samples> offset_mm, weight;
   double all = 0;
   for (int s = 0; s < through_samples; ++s) {
@@ -80,25 +88,26 @@ Picture signal_of(const SliceOfBody& body, const ScanPlane& plane, const ScanPro
     const auto at = static_cast<size_t>(s);
     offset_mm[at] = share * protocol.thickness_mm;
     weight[at] = profile(share);
-    all += weight[at] * in_plane_samples * in_plane_samples;
+    all += weight[at];
   }
-  Picture picture(protocol.matrix, protocol.matrix);
-  for (int row = 0; row < protocol.matrix; ++row) {
-    for (int column = 0; column < protocol.matrix; ++column) {
+  constexpr double first = 0.5 * (samples_a_pixel - 1);  // the first sample from its pixel's centre
+  Picture picture(count, count);
+  for (int row = 0; row < count; ++row) {
+    for (int column = 0; column < count; ++column) {
       double sum = 0;
-      for (int i = 0; i < in_plane_samples * in_plane_samples; ++i) {
-        const double right_mm = pixel_mm * (column + (i % in_plane_samples + 0.5) / in_plane_samples - 0.5);
-        const double down_mm = pixel_mm * (row + (i / in_plane_samples + 0.5) / in_plane_samples - 0.5);
-        for (size_t s = 0; s < through_samples; ++s) {
-          const Spot spot = body.at({right_mm, down_mm, offset_mm[s]});
-          if (spot.medium == Medium::nothing) continue;
-          const Eigen::Vector3d x_mm = plane.first_mm + right_mm * plane.along_row +
-                                       down_mm * plane.along_column + offset_mm[s] * plane.normal();
-          sum += weight[s] * signal.at(spot, x_mm);
-        }
+      for (int s = 0; s < through_samples; ++s) {
+        const auto [right, down] = within_sample(s);
+        const double right_mm = sample_mm * (column - first + right),
+                     down_mm = sample_mm * (row - first + down);
+        const double through_mm = offset_mm[static_cast<size_t>(s)];
+        const Spot spot = body.at({right_mm, down_mm, through_mm});
+        if (spot.medium == Medium::nothing) continue;
+        const Eigen::Vector3d x_mm = plane.first_mm + right_mm * plane.along_row +
+                                     down_mm * plane.along_column + through_mm * plane.normal();
+        sum += weight[static_cast<size_t>(s)] * signal.at(spot, x_mm);
       }
       // The coils lie to one side and below: sensitivity falls by `shading` towards the other corner.
-      const double far = (row + column) / (2.0 * protocol.matrix);
+      const double far = (row + column) / (2.0 * count);
       picture(row, column) = static_cast<float>(sum / all * (1 + protocol.shading * (0.5 - far)));
     }
   }
@@ -106,8 +115,7 @@ Picture signal_of(const SliceOfBody& body, const ScanPlane& plane, const ScanPro
 }
 
 Picture acquired(const Picture& signal, const ScanProtocol& protocol, unsigned seed) {
-  Spectrum spectrum = signal.cast<std::complex<float>>();
-  transform(spectrum, -1);
+  Spectrum spectrum = measured_spectrum(signal.cast<std::complex<float>>(), samples_a_pixel);
   const Eigen::Index rows = spectrum.rows();
   const double half = 0.5 * protocol.acquired * static_cast<double>(rows);
   std::mt19937 engine(seed);

@@ -16,12 +16,15 @@ struct TagPlane {
   double offset_mm;
 };
 
-/// The signal with partial volume and a soft slice profile; tissue far from the coils' shade is 1. Tags that were laid at time 0 ride with
+/// Each way; edges are then displaced by no more than the pixel's band allows.
+constexpr int samples_a_pixel = 3;
+
+/// The signal, several samples a pixel, with a soft slice profile; tissue far from the coils' shade is 1. Tags that were laid at time 0 ride with
 /// the tissue, stay in the bath's resting water and are gone in the cavity's within two phases.
 Picture signal_of(const SliceOfBody& body, const ScanPlane& plane, const ScanProtocol& protocol,
                   const std::vector<TagPlane>& tags, double time_s);
 
-/// What the scanner makes of it: the measured lines of its spectrum, tapered, complex noise in them, magnitude. Noise has a
+/// What the scanner makes of it: the measured lines of its spectrum, tapered along the columns, complex noise in them, magnitude. Noise has a
 /// standard deviation of 1 / snr in each channel.
 Picture acquired(const Picture& signal, const ScanProtocol& protocol, unsigned seed);
 
