@@ -32,11 +32,11 @@ struct Contour {
 
 Vector2d turned(double angle) { return {std::cos(angle), std::sin(angle)}; }
 
-Contour contour_from(const CineSlice& slice, const Eigen::ArrayXXd& image, const Vector2d& centre) {
+Contour contour_from(const CineSlice& slice, const FineImage& image, const Vector2d& centre) {
   Contour contour;
   for (int i = 0; i < rays; ++i) {
     const Vector2d direction = turned(2 * std::numbers::pi * i / rays);
-    const std::optional<WallOnRay> wall = wall_on_ray(slice, profile_of(slice, image, centre, direction));
+    const std::optional<WallOnRay> wall = wall_on_ray(slice, profile_of(image, centre, direction));
     if (!wall) continue;
     contour.inner.push_back(centre + wall->inner_mm * direction);
     contour.outer.push_back(centre + wall->outer_mm * direction);
@@ -111,8 +111,9 @@ class CineFinder {
       if (slice.is_long || !slice.has(phase) || top_mm > base_mm) continue;
       Vector2d centre = slice.plane.in_plane_mm(cines_.crossing_mm(slice));
       // The slice may be displaced: its centre is that of its contour.
+      const FineImage image = fine_image(slice, slice.images[phase]);
       for (int i = 0; i < 3; ++i) {
-        contours[s] = contour_from(slice, slice.images[phase], centre);
+        contours[s] = contour_from(slice, image, centre);
         if (contours[s].inner.size() < rays / 3) break;
         centre = mean_of(contours[s].inner);
       }
@@ -146,11 +147,11 @@ class CineFinder {
 
   void find_long(size_t phase, size_t s) {
     const CineSlice& slice = cines_.slices[s];
-    const Eigen::ArrayXXd& image = slice.images[phase];
+    const FineImage image = fine_image(slice, slice.images[phase]);
     const Vector2d middle = slice.plane.in_plane_mm(cines_.axis_point_mm);
     const Vector2d up = (slice.plane.in_plane_mm(cines_.axis_point_mm + cines_.axis) - middle).normalized();
     // The apex of the cavity, from the middle of the blood downwards.
-    const std::optional<WallOnRay> apex = wall_on_ray(slice, profile_of(slice, image, middle, -up));
+    const std::optional<WallOnRay> apex = wall_on_ray(slice, profile_of(image, middle, -up));
     if (!apex) return;
     // Across the axis from the apex to above the base, and a fan about the apex.
     const Vector2d across(-up.y(), up.x());
@@ -160,7 +161,7 @@ class CineFinder {
       for (size_t k = 0; k < 2; ++k) {
         const Vector2d direction = k == 0 ? across : Vector2d(-across);
         const std::optional<WallOnRay> wall =
-            wall_on_ray(slice, profile_of(slice, image, middle + h * up, direction));
+            wall_on_ray(slice, profile_of(image, middle + h * up, direction));
         if (!wall) continue;
         // Above the first gap nothing is the ventricle's.
         if (!height[k].empty() && h > height[k].back() + 7) continue;
@@ -172,34 +173,42 @@ class CineFinder {
     for (int i = -4; i <= 4; ++i) {
       const double angle = i * std::numbers::pi / 10;
       const Vector2d direction = -std::cos(angle) * up + std::sin(angle) * across;
-      const std::optional<WallOnRay> wall = wall_on_ray(slice, profile_of(slice, image, focus, direction));
+      const std::optional<WallOnRay> wall = wall_on_ray(slice, profile_of(image, focus, direction));
       if (!wall) continue;
       add(phase, s, GuideSurface::endo, focus + wall->inner_mm * direction);
       add(phase, s, GuideSurface::epi, focus + wall->outer_mm * direction);
     }
+    const double blur_mm = 1.5 * std::max(slice.plane.column_spacing_mm, slice.plane.row_spacing_mm);
     for (size_t k = 0; k < 2; ++k) {
+      if (side[k].size() < 2) continue;
       const Vector2d direction = k == 0 ? across : Vector2d(-across);
-      // The last two rows, less than 5 to 7 mm below the wall's end, are blurred with what is above the base.
-      for (size_t i = 0; i + 2 < side[k].size(); ++i) {
+      const double from_mm = height[k].back() - 5;
+      const std::optional<double> end =
+          find_base(phase, s, image, middle + from_mm * up, direction, up, side[k][side[k].size() - 2]);
+      // Rows that are blurred with what is above the base show no wall as it is.
+      const double last_mm = end ? from_mm + *end - blur_mm : from_mm;
+      for (size_t i = 0; i < side[k].size() && height[k][i] < last_mm; ++i) {
         const Vector2d on_axis = middle + height[k][i] * up;
         add(phase, s, GuideSurface::endo, on_axis + side[k][i].inner_mm * direction);
         add(phase, s, GuideSurface::epi, on_axis + side[k][i].outer_mm * direction);
       }
-      if (side[k].size() > 1)
-        find_base(phase, s, middle + (height[k].back() - 5) * up, direction, up, side[k][side[k].size() - 2]);
     }
   }
 
-  /// Upwards through the wall, in three places of its thickness.
-  void find_base(size_t phase, size_t s, const Vector2d& from, const Vector2d& outwards, const Vector2d& up,
-                 const WallOnRay& wall) {
+  /// Upwards through the wall, in three places of its thickness; returns the lowest end.
+  std::optional<double> find_base(size_t phase, size_t s, const FineImage& image, const Vector2d& from,
+                                  const Vector2d& outwards, const Vector2d& up, const WallOnRay& wall) {
     const CineSlice& slice = cines_.slices[s];
+    std::optional<double> lowest;
     for (const double part : {0.35, 0.5, 0.65}) {
       const Vector2d start = from + std::lerp(wall.inner_mm, wall.outer_mm, part) * outwards;
-      const std::vector<double> profile = profile_of(slice, slice.images[phase], start, up);
+      const std::vector<double> profile = profile_of(image, start, up);
       const std::optional<double> end = falls_through(profile, slice.levels.outer(), 0);
-      if (end && *end < 25) add(phase, s, GuideSurface::base, start + *end * up);
+      if (!end || *end >= 25) continue;
+      add(phase, s, GuideSurface::base, start + *end * up);
+      lowest = std::min(lowest.value_or(*end), *end);
     }
+    return lowest;
   }
 
   const Cines& cines_;

@@ -188,8 +188,8 @@ class CineReader {
       if (slice.is_long) {
         const Vector2d up =
             (slice.plane.in_plane_mm(cines_.axis_point_mm + cines_.axis) - centre).normalized();
-        const auto closed = [&](const Vector2d& d) {
-          return wall_on_ray(slice, profile_of(slice, slice.first_image(), centre, d)).has_value();
+        const auto closed = [&, image = fine_image(slice, slice.first_image())](const Vector2d& d) {
+          return wall_on_ray(slice, profile_of(image, centre, d)).has_value();
         };
         votes += (closed(-up) ? 1 : 0) - (closed(up) ? 1 : 0);
       }

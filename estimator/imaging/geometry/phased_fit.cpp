@@ -1,5 +1,8 @@
 #include "estimator/imaging/geometry/phased_fit.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace diastole::imaging {
 
 PhasedFit::PhasedFit(std::vector<PhaseEquations> equations) {
@@ -11,6 +14,7 @@ PhasedFit::PhasedFit(std::vector<PhaseEquations> equations) {
     phase.cy = e.common.transpose() * e.y;
     phase.dy = e.departure.transpose() * e.y;
     phase.yy = e.y.squaredNorm();
+    phase.rows = static_cast<double>(e.y.size());
     rows_ += e.y.size();
     phases_.push_back(std::move(phase));
   }
@@ -55,6 +59,13 @@ void PhasedFit::solve(const PhasedPrior& prior) {
 
 Eigen::VectorXd PhasedFit::square_of_common() const {
   return common_.cwiseAbs2() + common_covariance_.diagonal();
+}
+
+double PhasedFit::rms_of(size_t phase, const Eigen::VectorXd& common) const {
+  const Phase& p = phases_[phase];
+  const Eigen::Index count = common.size();
+  if (p.rows == 0) return 0;
+  return std::sqrt(std::max(0.0, common.dot(p.cc.topLeftCorner(count, count) * common)) / p.rows);
 }
 
 Eigen::MatrixXd PhasedFit::covariance(size_t phase, const Eigen::MatrixXd& of_common,

@@ -44,6 +44,8 @@ class PhasedFit {
   /// Expected sum of squared noise in units of the equations' own sigmas.
   [[nodiscard]] double noise_square() const { return noise_square_; }
   [[nodiscard]] Eigen::Index rows() const { return rows_; }
+  /// RMS over a phase's equations of C z, for the first unknowns z; in the equations' own sigmas.
+  [[nodiscard]] double rms_of(size_t phase, const Eigen::VectorXd& common) const;
   /// Covariance of T z + U d_p.
   [[nodiscard]] Eigen::MatrixXd covariance(size_t phase, const Eigen::MatrixXd& of_common,
                                            const Eigen::MatrixXd& of_departure) const;
@@ -52,7 +54,7 @@ class PhasedFit {
   struct Phase {
     Eigen::MatrixXd cc, cd, dd;  // C'C, C'D, D'D
     Eigen::VectorXd cy, dy;
-    double yy = 0;
+    double yy = 0, rows = 0;
     Eigen::MatrixXd inverse;  // (D'D / scale^2 + 1 / v_d)^-1
     Eigen::MatrixXd gain;     // inverse D'C / scale^2
     Eigen::VectorXd departure;

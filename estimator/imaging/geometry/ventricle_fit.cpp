@@ -29,16 +29,12 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 /// Eight waves around and from pole to pole: shorter ones than the elements of a usual mesh can show.
-constexpr int common_degree = 8;
-/// From phase to phase a ventricle changes in longer waves than it has.
-constexpr int departure_degree = 5;
-constexpr Index common_count = harmonic_count(common_degree);
-constexpr Index departure_count = harmonic_count(departure_degree);
+constexpr int wall_degree = 8;
+constexpr Index wall_count = harmonic_count(wall_degree);
 
-/// Unknowns: middle and thickness of the wall, the base plane; the same of departures.
-constexpr Index common_base = 2 * common_count;
-constexpr Index state_count = common_base + 3;
-constexpr Index departure_base = 2 * departure_count;
+/// Unknowns of a phase, and of its departure from what all phases have in common: middle and thickness of the wall, the base plane.
+constexpr Index base_place = 2 * wall_count;
+constexpr Index state_count = base_place + 3;
 constexpr double huber_sigmas = 3;
 constexpr double wild_sigmas = 5;
 /// Below this share of the normal in the image's plane a click slides along the wall, and the wall's curvature makes an error of
@@ -63,20 +59,19 @@ VectorXd variances(const Spectrum& spectrum, Index count) {
   return v;
 }
 
-/// The likeliest spectrum of coefficients whose expected squares are these, each the sum of so many.
-Spectrum likeliest_spectrum(const VectorXd& squares, double repeats, bool zero_is_known) {
+/// The likeliest spectrum of coefficients whose expected squares are these.
+Spectrum likeliest_spectrum(const VectorXd& squares) {
   Spectrum best;
-  if (zero_is_known) best.zero = std::max(1e-12, squares[0] / repeats);
   double least = std::numeric_limits<double>::infinity();
   // Below a power of 2 a wall would have no slope, and waves beyond a power of 6 have no say.
   for (double power = 2; power <= 6.001; power += 0.1) {
-    Spectrum trial{best.zero, 1, power};
+    Spectrum trial{.amplitude = 1, .power = power};
     double weighted = 0, logarithms = 0;
-    const double count = repeats * static_cast<double>(squares.size() - 1);
+    const auto count = static_cast<double>(squares.size() - 1);
     for (Index k = 1; k < squares.size(); ++k) {
       const double shape = trial.variance(harmonic_degree(k));
       weighted += squares[k] / shape;
-      logarithms += repeats * std::log(shape);
+      logarithms += std::log(shape);
     }
     trial.amplitude = std::max(1e-12, weighted / count);
     const double cost = count * std::log(trial.amplitude) + logarithms + weighted / trial.amplitude;
@@ -101,7 +96,7 @@ Misfit misfit(const ProlateFrame& frame, const Vector3d& patient_mm, const Vecto
   Prolate at = frame.coordinates(frame.inside(patient_mm));
   // The axis itself has no direction around it.
   at.mu = std::max(at.mu, 1e-6);
-  const Harmonics basis = harmonics(common_degree, at.mu, at.theta);
+  const Harmonics basis = harmonics(wall_degree, at.mu, at.theta);
   const VectorXd coefficients = middle + side * thickness;
   const double wall = basis.value.dot(coefficients);
   const double by_mu = basis.by_mu.dot(coefficients);
@@ -142,7 +137,7 @@ class WallFit {
     const double whole = std::sqrt(4 * std::numbers::pi);  // of a constant one
     VectorXd first = VectorXd::Zero(state_count);
     first[0] = whole * 0.5 * (start.inner_lambda + start.outer_lambda);
-    first[common_count] = whole * (start.outer_lambda - start.inner_lambda);
+    first[wall_count] = whole * (start.outer_lambda - start.inner_lambda);
     coefficients_.assign(guide.phases.size(), first);
     shifts_ = VectorXd::Zero(2 * static_cast<Index>(free_.size()));
   }
@@ -153,9 +148,9 @@ class WallFit {
       // The equations change little once the walls are near: then every fifth time does.
       if (iterations_ <= 6 || iterations_ % 5 == 0) fit_.emplace(equations());
       fit_->solve(prior());
-      const double moved_mm = take_over();
+      const double moved = take_over();
       const double evidence_moved = set_variances();
-      if (iterations_ > 8 && iterations_ % 5 == 0 && moved_mm < 2e-3 && evidence_moved < 0.05) return true;
+      if (iterations_ > 8 && iterations_ % 5 == 0 && moved < 0.005 && evidence_moved < 0.05) return true;
     }
     return false;
   }
@@ -164,7 +159,7 @@ class WallFit {
   [[nodiscard]] MatrixXd covariance(size_t phase) const {
     MatrixXd of_common = MatrixXd::Zero(state_count, state_count + shifts_.size());
     of_common.leftCols(state_count).setIdentity();
-    return fit_->covariance(phase, of_common, departure_map());
+    return fit_->covariance(phase, of_common, MatrixXd::Identity(state_count, departures()));
   }
   [[nodiscard]] Vector3d shift_mm(size_t free) const {
     return frame_.axes * (free_[free].directions * shifts_.segment<2>(2 * static_cast<Index>(free)));
@@ -178,7 +173,7 @@ class WallFit {
   [[nodiscard]] int iterations() const { return iterations_; }
   [[nodiscard]] Misfit misfit_of(const GuidePoint& point) const {
     const VectorXd& c = coefficients_[point.phase];
-    return misfit(frame_, true_place(point), c.head(common_count), c.segment(common_count, common_count),
+    return misfit(frame_, true_place(point), c.head(wall_count), c.segment(wall_count, wall_count),
                   side_of(point.surface));
   }
   [[nodiscard]] double sigma_mm(const GuidePoint& point, const Misfit& m) const {
@@ -197,24 +192,13 @@ class WallFit {
     return free < 0 ? point.place_mm : Vector3d(point.place_mm - shift_mm(static_cast<size_t>(free)));
   }
 
-  /// Departures, middle and thickness, among the coefficients.
-  [[nodiscard]] MatrixXd departure_map() const {
-    MatrixXd map = MatrixXd::Zero(state_count, departures());
-    if (!has_departures()) return map;
-    constexpr Index n = departure_count;
-    map.block<n, n>(0, 0).setIdentity();
-    map.block<n, n>(common_count, n).setIdentity();
-    map.block<3, 3>(common_base, departure_base).setIdentity();
-    return map;
-  }
-
   [[nodiscard]] std::vector<PhaseEquations> equations() const {
     std::vector<Index> rows(guide_.phases.size(), 0);
     for (const GuidePoint& point : guide_.points)
       ++rows[point.phase];
     std::vector<PhaseEquations> all;
     for (const Index count : rows)
-      all.push_back({MatrixXd::Zero(count, state_count + shifts_.size()), MatrixXd::Zero(count, departures()),
+      all.push_back({MatrixXd::Zero(count, state_count + shifts_.size()), MatrixXd::Zero(count, 0),
                      VectorXd::Zero(count)});
     std::fill(rows.begin(), rows.end(), 0);
     for (const GuidePoint& point : guide_.points) {
@@ -225,13 +209,10 @@ class WallFit {
       } else {
         add_wall_row(e, row, point);
       }
-      if (has_departures()) {
-        constexpr Index n = departure_count;
-        e.departure.row(row).head<n>() = e.common.row(row).head<n>();
-        e.departure.row(row).segment<n>(n) = e.common.row(row).segment<n>(common_count);
-        e.departure.row(row).tail<3>() = e.common.row(row).segment<3>(common_base);
-      }
     }
+    if (has_departures())
+      for (PhaseEquations& e : all)
+        e.departure = e.common.leftCols(state_count);
     return all;
   }
 
@@ -247,8 +228,8 @@ class WallFit {
     double weight = 1 / sigma_mm(point, m);
     weight *= robust_share(std::abs(m.distance_mm) * weight);
     const double side = side_of(point.surface);
-    e.common.row(row).head<common_count>() = weight * m.mm_per_lambda * m.basis.transpose();
-    e.common.row(row).segment<common_count>(common_count) = side * e.common.row(row).head<common_count>();
+    e.common.row(row).head<wall_count>() = weight * m.mm_per_lambda * m.basis.transpose();
+    e.common.row(row).segment<wall_count>(wall_count) = side * e.common.row(row).head<wall_count>();
     if (const Index free = place_[point.slice]; free >= 0)
       e.common.row(row).segment<2>(state_count + 2 * free) =
           weight * m.normal.transpose() * free_[static_cast<size_t>(free)].directions;
@@ -262,37 +243,33 @@ class WallFit {
     const Vector3d terms(1, x.x(), x.y());
     double weight = 1 / point.sigma_mm;
     weight *= robust_share(weight * std::abs(x.z() - terms.dot(coefficients_[point.phase].tail<3>())));
-    e.common.row(row).segment<3>(common_base) = weight * terms;
+    e.common.row(row).segment<3>(base_place) = weight * terms;
     e.y[row] = weight * x.z();
   }
 
   [[nodiscard]] PhasedPrior prior() const {
     PhasedPrior prior;
     prior.common_variance.resize(state_count + shifts_.size());
-    prior.common_variance << variances(common_[0], common_count), variances(common_[1], common_count),
+    prior.common_variance << variances(common_[0], wall_count), variances(common_[1], wall_count),
         Vector3d::Constant(std::numeric_limits<double>::infinity()),
         VectorXd::Constant(shifts_.size(), shift_variance_);
     prior.departure_variance.resize(departures());
-    if (has_departures())
-      prior.departure_variance << variances(departure_[0], departure_count),
-          variances(departure_[1], departure_count), base_height_variance_, base_tilt_variance_,
-          base_tilt_variance_;
+    if (has_departures()) prior.departure_variance = departure_variance_;
     prior.noise_variance = noise_variance_;
     return prior;
   }
 
-  /// The solution becomes the state; returns by how much a wall moved at most, about.
+  /// The solution becomes the state; returns by how much the walls moved where they are seen: the RMS of the worst phase, in points' sigmas.
   double take_over() {
     double moved = 0;
-    const MatrixXd map = departure_map();
     for (size_t p = 0; p < coefficients_.size(); ++p) {
-      const VectorXd now = fit_->common().head(state_count) + map * fit_->departure(p);
-      moved = std::max(moved,
-                       (now - coefficients_[p]).head(common_base).norm() / std::sqrt(4 * std::numbers::pi));
+      VectorXd now = fit_->common().head(state_count);
+      if (has_departures()) now += fit_->departure(p);
+      moved = std::max(moved, fit_->rms_of(p, now - coefficients_[p]));
       coefficients_[p] = now;
     }
     shifts_ = fit_->common().tail(shifts_.size());
-    return moved * frame_.focus_mm * std::cosh(coefficients_[0][0] / std::sqrt(4 * std::numbers::pi));
+    return moved;
   }
 
   /// The maximisation step; returns the largest relative change of a standard deviation that matters.
@@ -305,7 +282,7 @@ class WallFit {
     const VectorXd squares = fit_->square_of_common();
     for (Index field = 0; field < 2; ++field)
       common_[static_cast<size_t>(field)] =
-          likeliest_spectrum(squares.segment(field * common_count, common_count), 1, false);
+          likeliest_spectrum(squares.segment(field * wall_count, wall_count));
     if (has_departures()) learn_departures();
     if (shifts_.size() > 0) set(shift_variance_, std::max(1e-4, squares.tail(shifts_.size()).mean()));
     // What a person says of the error of clicks counts like twenty points.
@@ -314,18 +291,26 @@ class WallFit {
     return change;
   }
 
+  /// Of each degree, and there of what is alike all around by itself: what holds a base and what fills a cavity moves walls so, and far more than
+  /// all else does.
   void learn_departures() {
-    const VectorXd& squares = fit_->square_of_departures();
     const double phases = static_cast<double>(guide_.phases.size());
-    for (Index field = 0; field < 2; ++field)
-      departure_[static_cast<size_t>(field)] =
-          likeliest_spectrum(squares.segment(field * departure_count, departure_count), phases, true);
-    base_height_variance_ = std::max(1e-6, squares[departure_base] / phases);
-    base_tilt_variance_ = std::max(1e-9, squares.tail<2>().sum() / (2 * phases));
+    const VectorXd squares = fit_->square_of_departures() / phases;
+    for (const Index field : {Index{0}, wall_count}) {
+      for (Index l = 0; l <= wall_degree; ++l) {
+        const Index first = field + l * l, count = 2 * l + 1, alike = first + l;
+        const double others = squares.segment(first, count).sum() - squares[alike];
+        departure_variance_.segment(first, count)
+            .setConstant(std::max(1e-12, others / std::max(1.0, 2.0 * static_cast<double>(l))));
+        departure_variance_[alike] = std::max(1e-12, squares[alike]);
+      }
+    }
+    departure_variance_[base_place] = std::max(1e-6, squares[base_place]);
+    departure_variance_.tail<2>().setConstant(std::max(1e-9, squares.tail<2>().mean()));
   }
 
   [[nodiscard]] bool has_departures() const { return guide_.phases.size() > 1; }
-  [[nodiscard]] Index departures() const { return has_departures() ? departure_base + 3 : 0; }
+  [[nodiscard]] Index departures() const { return has_departures() ? state_count : 0; }
 
   const GuidePoints& guide_;
   ProlateFrame frame_;
@@ -337,10 +322,11 @@ class WallFit {
   VectorXd shifts_;
   // To start: departures from an ellipsoid of a twentieth, and shifts of 2 mm.
   std::array<Spectrum, 2> common_{Spectrum{.amplitude = 0.01}, Spectrum{.amplitude = 0.003}};
-  std::array<Spectrum, 2> departure_{Spectrum{.zero = 0.1, .amplitude = 0.003},
-                                     Spectrum{.zero = 0.1, .amplitude = 0.001}};
   // ... a base that moves by a centimetre and tilts by a tenth.
-  double base_height_variance_ = 100, base_tilt_variance_ = 0.01;
+  VectorXd departure_variance_ =
+      (VectorXd(state_count) << variances({.zero = 0.1, .amplitude = 0.003}, wall_count),
+       variances({.zero = 0.1, .amplitude = 0.001}, wall_count), 100, 0.01, 0.01)
+          .finished();
   double shift_variance_ = 4;
   double noise_variance_ = 1;
   int iterations_ = 0;
@@ -444,8 +430,8 @@ void add_phases(VentricleFit& fit, const GuidePoints& guide, const WallFit& wall
   for (size_t p = 0; p < guide.phases.size(); ++p) {
     VentricleWalls one;
     one.phase = guide.phases[p];
-    one.middle = walls.coefficients(p).head(common_count);
-    one.thickness = walls.coefficients(p).segment(common_count, common_count);
+    one.middle = walls.coefficients(p).head(wall_count);
+    one.thickness = walls.coefficients(p).segment(wall_count, wall_count);
     one.base = walls.coefficients(p).tail<3>();
     one.covariance = walls.covariance(p);
     one.points = counts[p];

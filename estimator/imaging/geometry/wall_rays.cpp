@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "estimator/imaging/series/spectrum.hpp"
+
 namespace diastole::imaging {
 namespace {
 
@@ -11,15 +13,17 @@ using Eigen::Vector2d;
 
 constexpr double least_wall_mm = 3, most_wall_mm = 25;
 
-/// Between the four pixels around; nothing outside.
-std::optional<double> grey_at(const CineSlice& slice, const Eigen::ArrayXXd& image, const Vector2d& mm) {
-  const double column = mm.x() / slice.plane.column_spacing_mm, row = mm.y() / slice.plane.row_spacing_mm;
+/// Between the four places around; nothing outside.
+std::optional<double> grey_at(const FineImage& image, const Vector2d& mm) {
+  const double column = mm.x() / image.column_spacing_mm, row = mm.y() / image.row_spacing_mm;
   const auto c = static_cast<Eigen::Index>(std::floor(column)),
              r = static_cast<Eigen::Index>(std::floor(row));
-  if (c < 0 || r < 0 || c + 1 >= image.cols() || r + 1 >= image.rows()) return {};
+  if (c < 0 || r < 0 || c + 1 >= image.grey.cols() || r + 1 >= image.grey.rows()) return {};
   const double u = column - static_cast<double>(c), v = row - static_cast<double>(r);
-  return (1 - v) * ((1 - u) * image(r, c) + u * image(r, c + 1)) +
-         v * ((1 - u) * image(r + 1, c) + u * image(r + 1, c + 1));
+  const auto grey = [&](Eigen::Index i, Eigen::Index j) {
+    return static_cast<double>(image.grey(r + i, c + j));
+  };
+  return (1 - v) * ((1 - u) * grey(0, 0) + u * grey(0, 1)) + v * ((1 - u) * grey(1, 0) + u * grey(1, 1));
 }
 
 size_t sample_after(double mm) { return static_cast<size_t>(std::max(0.0, mm) / ray_step_mm) + 1; }
@@ -46,11 +50,16 @@ std::optional<double> falls_through(const std::vector<double>& profile, double l
   return {};
 }
 
-std::vector<double> profile_of(const CineSlice& slice, const Eigen::ArrayXXd& image, const Vector2d& from,
-                               const Vector2d& direction) {
+FineImage fine_image(const CineSlice& slice, const Eigen::ArrayXXd& image) {
+  constexpr Eigen::Index finer = 4;  // linear weights between are then good to a hundredth of a pixel
+  return {zero_filled(image.cast<float>(), finer), slice.plane.row_spacing_mm / finer,
+          slice.plane.column_spacing_mm / finer};
+}
+
+std::vector<double> profile_of(const FineImage& image, const Vector2d& from, const Vector2d& direction) {
   std::vector<double> profile;
   for (double r = 0; r < ray_mm; r += ray_step_mm) {
-    const std::optional<double> grey = grey_at(slice, image, from + r * direction);
+    const std::optional<double> grey = grey_at(image, from + r * direction);
     if (!grey) break;
     profile.push_back(*grey);
   }

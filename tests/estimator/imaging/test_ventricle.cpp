@@ -1,5 +1,6 @@
 // Clicks on simulated ventricles (tools/sim_scanner, which shares no shapes with the estimator) back to walls, volumes and slices.
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -7,6 +8,7 @@
 #include <functional>
 #include <numbers>
 #include <random>
+#include <tuple>
 
 #include "estimator/imaging/geometry/ventricle_session.hpp"
 #include "estimator/imaging/geometry/wall_harmonics.hpp"
@@ -96,6 +98,49 @@ TEST(Ventricle, ItsApexIsFoundWhereTheOuterWallsFocusLiesBeyondIt) {
         wall_mm, {}, [&](const Eigen::Vector3d& x) { return fit.frame.inside(x).z(); });
     EXPECT_NEAR(map.distance_mm(is_inner ? -0.5 : 0.5, fit.frame.inside(apex_mm)), 0, 0.2) << is_inner;
   }
+}
+
+/// Exact clicks on ellipsoids (21, 51; 30, 60 mm, base at 15 mm) that widen from phase to phase, but for the base, which is held: six short-axis
+/// and three long-axis slices.
+std::string clicks_on_a_held_base(int phases) {
+  std::string csv = "phase,slice,surface,x_mm,y_mm,z_mm,sigma_mm\n";
+  const auto add = [&](int phase, const std::string& slice, const char* surface, double r, double angle,
+                       double z) {
+    csv += fmt::format("{},{},{},{},{},{},0.4\n", phase, slice, surface, r * std::cos(angle),
+                       r * std::sin(angle), z);
+  };
+  constexpr double base_mm = 15, layer_mm = 6, pi = std::numbers::pi;
+  for (int p = 0; p < phases; ++p) {
+    for (const auto& [surface, across, along] : {std::tuple("endo", 21.0, 51.0), {"epi", 30.0, 60.0}}) {
+      const auto radius = [p, across = across, along = along](double z) {
+        return across * std::sqrt(1 - z * z / (along * along)) *
+               (1 + 0.02 * p * -std::expm1((z - base_mm) / layer_mm));
+      };
+      for (int z = -40; z <= 10; z += 10)
+        for (int i = 0; i < 16; ++i)
+          add(p, fmt::format("sa{}", z / 10 + 4), surface, radius(z), pi * i / 8, z);
+      for (int plane = 0; plane < 3; ++plane)
+        for (const double turn : {0.0, pi})
+          for (double z = -along + 1; z < base_mm - 2; z += 2.5)
+            add(p, fmt::format("la{}", plane), surface, radius(z), pi * plane / 3 + turn, z);
+    }
+    for (int plane = 0; plane < 3; ++plane)
+      for (const double turn : {0.0, pi})
+        add(p, fmt::format("la{}", plane), "base", 25.5, pi * plane / 3 + turn, base_mm);
+  }
+  return csv;
+}
+
+TEST(Ventricle, AHeldBaseInLaterPhasesBendsNoWallInTheFirst) {
+  const VentricleFit fit = measured(clicks_on_a_held_base(8)).fit;
+  const WallMap map(fit.frame, fit.phases[0]);
+  // Up to the base, beyond the last clicks; by one spectrum for all departures 0.3 mm.
+  for (const double z : {-30.0, -10.0, 5.0, 10.0, 15.0})
+    for (const auto& [side, across, along] : {std::tuple(-0.5, 21.0, 51.0), {0.5, 30.0, 60.0}})
+      EXPECT_NEAR(
+          map.distance_mm(side, fit.frame.inside({across * std::sqrt(1 - z * z / (along * along)), 0, z})), 0,
+          0.1)
+          << z << " mm, side " << side;
 }
 
 TEST(Ventricle, IsMeasuredInEveryPhaseFromClicksOfHalfAMillimetre) {
