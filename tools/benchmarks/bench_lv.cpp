@@ -1,6 +1,6 @@
-// `tools/bench lv [FOLDER] [--random N] [--example FILE]`: ventricles from guide points against labelled ones (FOLDER/NAME/NAME.guide.csv with
-// FOLDER/truth/NAME.surfaces.csv and NAME.volumes.csv, displacements in FOLDER/labels.json), default shared/data/dti beside the tree and no part of it,
-// and against random ones.
+// `tools/bench lv [FOLDER] [--random N] [--example FILE]`: ventricles from guide points, and from their cine images alone, against labelled ones
+// (FOLDER/NAME/NAME.guide.csv and FOLDER/NAME/dicom with FOLDER/truth/NAME.surfaces.csv and NAME.volumes.csv, displacements in FOLDER/labels.json),
+// default shared/data/dti beside the tree and no part of it, and against random ones.
 //
 // A row a phase: RMS of the true walls' points from the fitted ones, the error of the cavity's volume and how many sigmas that is.
 // Figures that miss their targets are marked MISSED, and any of them makes the exit code 1. `--example` writes the guide points of docs/lv.md.
@@ -14,10 +14,13 @@
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 
+#include "estimator/imaging/geometry/cine_points.hpp"
 #include "estimator/imaging/geometry/ventricle_session.hpp"
 #include "estimator/imaging/geometry/wall_map.hpp"
+#include "estimator/imaging/series/image_folder.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tools/benchmarks/figure_targets.hpp"
@@ -55,7 +58,16 @@ double rms_mm(const imaging::WallMap& map, const imaging::ProlateFrame& frame, d
   return std::sqrt(squares / static_cast<double>(truth.size()));
 }
 
-void score_case(const fs::path& folder, const std::string& name) {
+imaging::GuidePoints clicks_of(const fs::path& folder, const std::string& name) {
+  return imaging::read_guide_points(folder / (name + ".guide.csv"));
+}
+
+imaging::GuidePoints found_in_cines(const fs::path& folder, const std::string&) {
+  return imaging::cine_guide_points(imaging::read_cines(imaging::read_image_folder(folder / "dicom")));
+}
+
+void score_case(const fs::path& folder, const std::string& name, const char* source,
+                decltype(clicks_of)* guide_of) {
   std::map<std::pair<int, bool>, std::vector<Vector3d>> walls;
   for (const auto& row : rows_of(folder / "truth" / (name + ".surfaces.csv")))
     walls[{std::stoi(row[0]), row[1] == "epi"}].emplace_back(std::stod(row[2]), std::stod(row[3]),
@@ -64,11 +76,12 @@ void score_case(const fs::path& folder, const std::string& name) {
   for (const auto& row : rows_of(folder / "truth" / (name + ".volumes.csv")))
     volumes[std::stoi(row[0])] = std::stod(row[2]);
   const auto start = std::chrono::steady_clock::now();
-  const imaging::GuidePoints guide = imaging::read_guide_points(folder / name / (name + ".guide.csv"));
+  const imaging::GuidePoints guide = guide_of(folder / name, name);
   const imaging::VentricleSession session = imaging::measure_ventricle({}, guide);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  fmt::print("{}: points {:.3f} mm RMS from their walls, errors {:.2f} times those stated, {} s\n", name,
-             session.fit.rms_mm, session.fit.noise_factor, targets.at_most(seconds, limit_s, "{:.1f}"));
+  fmt::print("{}, {}: points {:.3f} mm RMS from their walls, errors {:.2f} times those stated, {} s\n", name,
+             source, session.fit.rms_mm, session.fit.noise_factor,
+             targets.at_most(seconds, limit_s, "{:.1f}"));
   fmt::print("  phase  endo (mm)  epi (mm)  cavity (mL)  error (%)  sigmas  least Jacobian\n");
   for (size_t p = 0; p < session.phases.size(); ++p) {
     const imaging::VentriclePhase& phase = session.phases[p];
@@ -84,11 +97,17 @@ void score_case(const fs::path& folder, const std::string& name) {
   }
   const nlohmann::json labels = nlohmann::json::parse(read_whole_file(folder / "labels.json"));
   const nlohmann::json& shifts = labels.at("cases").at(name).at("slice_shift_patient_mm");
+  std::set<std::string> seen;
+  for (const imaging::GuidePoint& point : guide.points)
+    seen.insert(guide.slices[point.slice]);
+  const auto counts = [&](const imaging::SliceShift& shift) {
+    return !shift.is_reference && seen.contains(shift.slice);
+  };
   std::string last;
   for (const imaging::SliceShift& shift : session.fit.shifts)
-    if (!shift.is_reference) last = shift.slice;
+    if (counts(shift)) last = shift.slice;
   for (const imaging::SliceShift& shift : session.fit.shifts) {
-    if (shift.is_reference) continue;
+    if (!counts(shift)) continue;
     const std::vector<double> truth = shifts.value(shift.slice, std::vector<double>{0, 0, 0});
     const double error = (shift.shift_mm - Vector3d(truth[0], truth[1], truth[2])).norm();
     fmt::print("  slice {}: displaced by {:.2f} mm, error {} mm\n", shift.slice, shift.shift_mm.norm(),
@@ -150,8 +169,10 @@ int main(int argc, char** argv) {
       return 0;
     }
     if (fs::exists(folder / "labels.json")) {
-      for (const char* name : {"cine-beat", "cine-shift"})
-        score_case(folder, name);
+      for (const char* name : {"cine-beat", "cine-shift"}) {
+        score_case(folder, name, "clicks", clicks_of);
+        score_case(folder, name, "cines", found_in_cines);
+      }
     } else {
       fmt::print("no labelled hearts in {}\n", folder.string());
     }
