@@ -133,8 +133,9 @@ TEST_F(ShapeSeriesTest, AFaultySessionStopsTheSeriesAndKeepsItsExitCode) {
 TEST_F(ShapeSeriesTest, ItsOptionsAreRefusedWithoutACurveToFollow) {
   for (const char* option :
        {"--rig soft.rig.toml", "--study gel.study.toml", "--cycles 9", "--iterations 2", "--page p.html"}) {
+    const auto series = make_shape_series();
     CLI::App command;
-    make_shape_series()->add_options(command);
+    series->add_options(command);
     EXPECT_THROW(command.parse(option), CLI::RequiresError) << option;
   }
 }
