@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "estimator/inference/covariance.hpp"
+
 namespace diastole {
 namespace {
 
@@ -192,7 +194,8 @@ PressureAtNoMotion pressure_at_no_motion(const std::vector<FrameField>& fields,
     A.row(i) = Eigen::RowVector3d(1.0, amplitude.value, amplitude.value * amplitude.value) / sigma_kPa;
     b[i] = load.pressure_kPa / sigma_kPa;
   }
-  const Eigen::Matrix3d covariance = (A.transpose() * A).inverse();
+  const auto [covariance, undetermined] = inference::estimate_covariance(A);
+  if (!undetermined.empty()) return {0.0, std::numeric_limits<double>::infinity()};
   const Eigen::Vector3d coefficients = covariance * (A.transpose() * b);
   const Eigen::RowVectorXd weights = covariance.row(0) * A.transpose();
   Eigen::VectorXd by_planes = Eigen::VectorXd::Zero(amplitudes.front().by_planes.size());

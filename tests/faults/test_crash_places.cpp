@@ -78,7 +78,8 @@ TEST(CrashPlaces, AreNamedByTheFirmwaresSymbols) {
   EXPECT_EQ(named.exit_code, 0) << named.err;
   EXPECT_THAT(named.out, HasSubstr(" in USART3_IRQHandler\n"));
   EXPECT_THAT(black_box({}).out, Not(HasSubstr("USART3_IRQHandler")));
-  for (const json& entry : black_box({"--elf", sim_board_test::firmware, "--json"}).json().at("entries")) {
+  const json document = black_box({"--elf", sim_board_test::firmware, "--json"}).json();
+  for (const json& entry : document.at("entries")) {
     if (entry.value("register", "") != "pc") continue;
     EXPECT_EQ(entry.at("symbol"), "USART3_IRQHandler");
   }

@@ -13,6 +13,7 @@
 #include "tests/flow/programs.hpp"
 #include "tests/flow/rig_with_daemon.hpp"
 #include "tests/host/flash/update_files.hpp"
+#include "tests/sanitized.hpp"
 
 namespace diastole::flow {
 namespace {
@@ -35,6 +36,7 @@ std::string write_update(const Workplace& workplace, const std::string& name,
 }
 
 TEST(FlashCommand, InstallsOverTheLineInterruptedOrNot) {
+  if (sanitized) GTEST_SKIP() << "real time, of which sanitizers leave too little";
   NEEDS_UPDATE_IMAGES();
   Workplace workplace;
   const std::string port = (workplace / "port").string();
