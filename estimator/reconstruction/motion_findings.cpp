@@ -171,7 +171,7 @@ bool check_load_order(Findings& findings, const MotionEvidence& evidence) {
 }
 
 /// Pressure at which the motion would vanish, extrapolated from the frames by a parabola p(amplitude). Needs four
-/// frames; the standard error is infinite with fewer. Tag planes that are wrong shift all amplitudes, as an offset of the pressure does; those of all
+/// frames; the standard error is infinite with fewer, or where their amplitudes do not determine it. Tag planes that are wrong shift all amplitudes, as an offset of the pressure does; those of all
 /// images are taken to be wrong alike, as they are where the first image shows the body already moved.
 struct PressureAtNoMotion {
   double value_kPa = 0.0;

@@ -185,14 +185,14 @@ std::optional<size_t> change_in(const std::vector<PeriodicCurve>& cycles, size_t
       line.row(i) << 1.0, static_cast<double>(i);
       seen[i] = size(static_cast<size_t>(i));
     }
-    const Eigen::Matrix2d covariance = inference::estimate_covariance(line).matrix;
-    const Eigen::Vector2d fit = covariance * line.transpose() * seen;
+    const Eigen::Matrix2d unit_covariance = inference::estimate_covariance(line).matrix;
+    const Eigen::Vector2d fit = unit_covariance * line.transpose() * seen;
     const double scatter =
         (seen - line * fit).norm() / std::sqrt(static_cast<double>(std::max<Eigen::Index>(half - 2, 1)));
     if (scatter > allowed_part * range_kPa) return counted.front();  // it burst while the line was drawn
     for (size_t i = static_cast<size_t>(half); i < counted.size(); ++i) {
       const Eigen::Vector2d here(1.0, static_cast<double>(i));
-      const double sd = scatter * std::sqrt(1.0 + here.dot(covariance * here));
+      const double sd = scatter * std::sqrt(1.0 + here.dot(unit_covariance * here));
       if (std::abs(size(i) - here.dot(fit)) > std::max(allowed_part * range_kPa, errors * sd))
         return counted[i];
     }

@@ -19,6 +19,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <functional>
+#include <iomanip>
 #include <optional>
 #include <sstream>
 #include <string>
@@ -49,10 +50,11 @@ inline const CLI::Validator nonnegative_number(
       return number_of(text).value_or(0.0) < 0.0 ? text + " is below zero" : "";
     },
     "NONNEGATIVE");
+/// Both included.
 template <class Number>
 CLI::Validator number_between(Number low, Number high) {
   std::ostringstream range;
-  range << low << " to " << high;
+  range << std::setprecision(15) << low << " to " << high;
   return {[low, high, range = range.str()](const std::string& text) {
             const double number = number_of(text).value_or(static_cast<double>(low));
             const bool is_between = number >= static_cast<double>(low) && number <= static_cast<double>(high);

@@ -166,13 +166,12 @@ HOSTILE = [external_link, external_group, user_defined_link, damaged_group, exte
 
 
 def limited():
+    if os.environ.get("DIASTOLE_SANITIZED"):
+        return  # which takes terabytes of address space
     resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
 
 
 def main():
-    if os.environ.get("DIASTOLE_SANITIZED"):
-        print("skipped: sanitizers take terabytes of address space, which is limited here")
-        sys.exit(77)
     diastole, source = str(pathlib.Path(sys.argv[1]).resolve()), pathlib.Path(sys.argv[2]).resolve()
     place = pathlib.Path(tempfile.mkdtemp(prefix="diastole-hostile-"))
     try:

@@ -15,7 +15,7 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr int samples_a_pixel = 6;
+constexpr int flow_samples_a_pixel = 6;
 
 struct Moment {
   const FlowPhantom& phantom;
@@ -45,8 +45,8 @@ struct Moment {
 /// The object's spectrum cut to the matrix, noise in each of its samples.
 Spectrum image_of(const Moment& moment, double share, std::mt19937& engine) {
   const PhaseContrastProtocol& protocol = moment.protocol;
-  const int fine = protocol.matrix * samples_a_pixel;
-  const double step_mm = protocol.pixel_mm / samples_a_pixel;
+  const int fine = protocol.matrix * flow_samples_a_pixel;
+  const double step_mm = protocol.pixel_mm / flow_samples_a_pixel;
   Spectrum object(fine, fine);
   for (int column = 0; column < fine; ++column) {
     for (int row = 0; row < fine; ++row) {
@@ -55,7 +55,7 @@ Spectrum image_of(const Moment& moment, double share, std::mt19937& engine) {
     }
   }
   const int n = protocol.matrix;
-  Spectrum cut = measured_spectrum(std::move(object), samples_a_pixel);
+  Spectrum cut = measured_spectrum(std::move(object), flow_samples_a_pixel);
   const double half = 0.5 * protocol.acquired * n;
   std::normal_distribution<double> noise(0, n / protocol.snr);
   for (int column = 0; column < n; ++column) {

@@ -22,11 +22,12 @@ constexpr double stirred_T_s = 0.08, bath_T1_s = 2.8;
 /// The profile across the slice, s in thicknesses from its middle.
 double profile(double s) { return 0.5 * (std::erf((s + 0.5) / soft_edge) - std::erf((s - 0.5) / soft_edge)); }
 
-/// Of a sample, in its own size: where within it layer s is looked at. No two layers share a row or a column, so that an edge along the pixels,
-/// as the plane of a base is, lies where it is to a sixth of a sample.
+/// Of a sample, in its own size: where within it layer s is looked at. No two layers share a row, a column or a diagonal, so that an edge along
+/// the pixels, as the plane of a base is, lies where it is to a third of a sample; layers that lie alike about the slice's middle are looked
+/// at in opposite places, so that no image is displaced.
 std::array<double, 2> within_sample(int s) {
-  constexpr int generator = 5;  // coprime to the count
-  return {(generator * s % through_samples + 0.5) / through_samples - 0.5, (s + 0.5) / through_samples - 0.5};
+  constexpr std::array<int, through_samples> column{2, 0, 4, 1, 5, 3};
+  return {(column[static_cast<size_t>(s)] + 0.5) / through_samples - 0.5, (s + 0.5) / through_samples - 0.5};
 }
 
 class Signal {

@@ -16,7 +16,7 @@ struct TagPlane {
   double offset_mm;
 };
 
-/// Each way; edges are then displaced by no more than the pixel's band allows.
+/// Each way.
 constexpr int samples_a_pixel = 3;
 
 /// The signal, several samples a pixel, with a soft slice profile; tissue far from the coils' shade is 1. Tags that were laid at time 0 ride with

@@ -163,8 +163,8 @@ class CineFinder {
         const std::optional<WallOnRay> wall =
             wall_on_ray(slice, profile_of(image, middle + h * up, direction));
         if (!wall) continue;
-        // Above the first gap nothing is the ventricle's.
-        if (!height[k].empty() && h > height[k].back() + 7) continue;
+        // One row may be missing; above two nothing is the ventricle's.
+        if (!height[k].empty() && h > height[k].back() + 2.5 * row_step_mm) continue;
         side[k].push_back(*wall);
         height[k].push_back(h);
       }
@@ -178,16 +178,18 @@ class CineFinder {
       add(phase, s, GuideSurface::endo, focus + wall->inner_mm * direction);
       add(phase, s, GuideSurface::epi, focus + wall->outer_mm * direction);
     }
-    const double blur_mm = 1.5 * std::max(slice.plane.column_spacing_mm, slice.plane.row_spacing_mm);
+    const double blur_mm = edge_blur_mm(slice.plane);
     for (size_t k = 0; k < 2; ++k) {
-      if (side[k].size() < 2) continue;
+      if (side[k].empty()) continue;
       const Vector2d direction = k == 0 ? across : Vector2d(-across);
-      const double from_mm = height[k].back() - 5;
-      const std::optional<double> end =
-          find_base(phase, s, image, middle + from_mm * up, direction, up, side[k][side[k].size() - 2]);
-      // Rows that are blurred with what is above the base show no wall as it is.
-      const double last_mm = end ? from_mm + *end - blur_mm : from_mm;
-      for (size_t i = 0; i < side[k].size() && height[k][i] < last_mm; ++i) {
+      // Rows that are blurred with what is above the base show no wall as it is; this one is surely not.
+      size_t low = side[k].size() - 1;
+      while (low > 0 && height[k].back() - height[k][low] < 2 * blur_mm)
+        --low;
+      const std::optional<double> end_mm =
+          find_base(phase, s, image, middle + height[k][low] * up, direction, up, side[k][low]);
+      const double last_mm = height[k][low] + std::max(0.0, end_mm.value_or(0.0) - blur_mm);
+      for (size_t i = 0; i < side[k].size() && height[k][i] <= last_mm; ++i) {
         const Vector2d on_axis = middle + height[k][i] * up;
         add(phase, s, GuideSurface::endo, on_axis + side[k][i].inner_mm * direction);
         add(phase, s, GuideSurface::epi, on_axis + side[k][i].outer_mm * direction);
@@ -195,20 +197,21 @@ class CineFinder {
     }
   }
 
-  /// Upwards through the wall, in three places of its thickness; returns the lowest end.
+  /// Upwards through the wall, in three places of its thickness; returns the middle one of where it ends, in mm above `from`.
   std::optional<double> find_base(size_t phase, size_t s, const FineImage& image, const Vector2d& from,
                                   const Vector2d& outwards, const Vector2d& up, const WallOnRay& wall) {
     const CineSlice& slice = cines_.slices[s];
-    std::optional<double> lowest;
+    std::vector<double> ends_mm;
     for (const double part : {0.35, 0.5, 0.65}) {
       const Vector2d start = from + std::lerp(wall.inner_mm, wall.outer_mm, part) * outwards;
-      const std::vector<double> profile = profile_of(image, start, up);
-      const std::optional<double> end = falls_through(profile, slice.levels.outer(), 0);
-      if (!end || *end >= 25) continue;
-      add(phase, s, GuideSurface::base, start + *end * up);
-      lowest = std::min(lowest.value_or(*end), *end);
+      const std::optional<double> end_mm = end_of_wall(slice, profile_of(image, start, up));
+      if (!end_mm || *end_mm >= 25) continue;
+      add(phase, s, GuideSurface::base, start + *end_mm * up);
+      ends_mm.push_back(*end_mm);
     }
-    return lowest;
+    if (ends_mm.empty()) return {};
+    std::ranges::sort(ends_mm);
+    return ends_mm[ends_mm.size() / 2];
   }
 
   const Cines& cines_;
@@ -223,7 +226,8 @@ GuidePoints cine_guide_points(const Cines& cines) {
   for (const CineSlice& slice : cines.slices)
     planes.push_back(slice.plane);
   try {
-    move_to_mid_slice(points, fit_ventricle(points), planes);
+    const VentricleFit fit = fit_ventricle(points);
+    if (fit.converged) move_to_mid_slice(points, fit, planes);
   } catch (const InputError&) {
     // Who fits these points gets to know why they make no ventricle.
   }

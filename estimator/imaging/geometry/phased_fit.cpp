@@ -5,14 +5,14 @@
 
 namespace diastole::imaging {
 
-PhasedFit::PhasedFit(std::vector<PhaseEquations> equations) {
-  for (PhaseEquations& e : equations) {
+PhasedFit::PhasedFit(const std::vector<PhaseEquations>& equations, Eigen::Index departures) {
+  for (const PhaseEquations& e : equations) {
     Phase phase;
     phase.cc = e.common.transpose() * e.common;
-    phase.cd = e.common.transpose() * e.departure;
-    phase.dd = e.departure.transpose() * e.departure;
+    phase.cd = phase.cc.leftCols(departures);
+    phase.dd = phase.cc.topLeftCorner(departures, departures);
     phase.cy = e.common.transpose() * e.y;
-    phase.dy = e.departure.transpose() * e.y;
+    phase.dy = phase.cy.head(departures);
     phase.yy = e.y.squaredNorm();
     phase.rows = static_cast<double>(e.y.size());
     rows_ += e.y.size();

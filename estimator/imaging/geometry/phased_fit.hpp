@@ -4,7 +4,7 @@
 //
 //   y_p = C_p z + D_p d_p + noise,   noise ~ N(0, scale^2),  z_i ~ N(0, v_z[i]),  d_pj ~ N(0, v_d[j])
 //
-// z is common, d_p the departure of phase p (D may have no columns). Variances are infinite where nothing is known.
+// z is common, d_p the departure of phase p from the first of them: D_p are the first columns of C_p, or none. Variances are infinite where nothing is known.
 // The posterior is exact (departures are eliminated phase by phase). Who calls it sets variances and noise from
 // `square_of_common`, `square_of_departures` and `noise_square`: the expectation step of EM (Dempster, Laird, Rubin 1977),
 // whose fixed point is the largest evidence.
@@ -16,8 +16,7 @@ namespace diastole::imaging {
 
 /// One phase's equations, divided by the standard deviations of their noise.
 struct PhaseEquations {
-  Eigen::MatrixXd common;     ///< C
-  Eigen::MatrixXd departure;  ///< D
+  Eigen::MatrixXd common;  ///< C
   Eigen::VectorXd y;
 };
 
@@ -29,7 +28,8 @@ struct PhasedPrior {
 
 class PhasedFit {
  public:
-  explicit PhasedFit(std::vector<PhaseEquations> equations);
+  /// `departures`: how many columns D has.
+  PhasedFit(const std::vector<PhaseEquations>& equations, Eigen::Index departures);
 
   /// Precondition: data and prior together determine everything.
   void solve(const PhasedPrior& prior);

@@ -10,7 +10,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// From where an edge is seen to the wall in the slice's middle. `distance_mm`: of a place outside the wall.
+/// From where an edge is seen to the wall in the slice's middle. `distance_mm`: of a place from the wall, positive outside.
 Vector3d to_mid_slice(const SlicePlane& plane, const Vector3d& seen_mm, const auto& distance_mm) {
   constexpr size_t layers = 8;
   std::array<double, layers> distances_mm{};

@@ -1,8 +1,8 @@
 #pragma once
 // What a thick slice makes of a wall: an edge in its image is where half of the thickness lies to either side of the wall.
 //
-// A wall that is round across the slice is therefore seen inside its place in the slice's middle (by thickness^2 / 32 of its
-// curvature across, 0.2 mm for 8 mm and a radius of 10 mm), one that is inclined and flat is not. The same of neighbours and phases.
+// A wall that is round across the slice is therefore seen inside its place in the slice's middle (by thickness^2 * curvature
+// across / 32: 0.2 mm for 8 mm and a radius of 10 mm), one that is inclined and flat is not. Neighbours and phases err alike by it.
 
 #include <vector>
 

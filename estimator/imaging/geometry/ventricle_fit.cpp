@@ -146,7 +146,7 @@ class WallFit {
   bool run(int limit) {
     for (iterations_ = 1; iterations_ <= limit; ++iterations_) {
       // The equations change little once the walls are near: then every fifth time does.
-      if (iterations_ <= 6 || iterations_ % 5 == 0) fit_.emplace(equations());
+      if (iterations_ <= 6 || iterations_ % 5 == 0) fit_.emplace(equations(), departures());
       fit_->solve(prior());
       const double moved = take_over();
       const double evidence_moved = set_variances();
@@ -198,8 +198,7 @@ class WallFit {
       ++rows[point.phase];
     std::vector<PhaseEquations> all;
     for (const Index count : rows)
-      all.push_back({MatrixXd::Zero(count, state_count + shifts_.size()), MatrixXd::Zero(count, 0),
-                     VectorXd::Zero(count)});
+      all.push_back({MatrixXd::Zero(count, state_count + shifts_.size()), VectorXd::Zero(count)});
     std::fill(rows.begin(), rows.end(), 0);
     for (const GuidePoint& point : guide_.points) {
       PhaseEquations& e = all[point.phase];
@@ -210,9 +209,6 @@ class WallFit {
         add_wall_row(e, row, point);
       }
     }
-    if (has_departures())
-      for (PhaseEquations& e : all)
-        e.departure = e.common.leftCols(state_count);
     return all;
   }
 
@@ -291,8 +287,8 @@ class WallFit {
     return change;
   }
 
-  /// Of each degree, and there of what is alike all around by itself: what holds a base and what fills a cavity moves walls so, and far more than
-  /// all else does.
+  /// One variance a degree for m = 0, one for the other orders: what holds a base and what fills a cavity moves walls alike all around, and far
+  /// more than all else does.
   void learn_departures() {
     const double phases = static_cast<double>(guide_.phases.size());
     const VectorXd squares = fit_->square_of_departures() / phases;

@@ -2,9 +2,10 @@
 // A ventricle's walls and base plane in every phase, from guide points.
 //
 // Walls: lambda(mu, theta) = sum of spherical harmonics (prolate_frame.hpp, wall_harmonics.hpp) for the middle of the wall
-// and for its thickness. The coefficients of a phase are those that all phases have in common plus a departure; of both the
-// variance falls with the degree l as a power, (l (l + 1) / 2)^-s, and amplitude and power are those of the largest
-// evidence. So is the error of a click, as a factor on the file's sigmas. The base is a plane, likewise common plus departure.
+// and for its thickness. The coefficients of a phase are those that all phases have in common plus a departure. Of the common
+// ones the variance falls with the degree l as a power, (l (l + 1) / 2)^-s; departures have one variance a degree for the
+// order m = 0 and one for the others. All are those of the largest evidence, and so is the error of a click, as a factor on the
+// file's sigmas. The base is a plane, likewise common plus departure.
 //
 // A point's residual is its distance from the wall along the normal; a click has its error in its image's plane, which counts by
 // the share of the normal that lies in the plane, and across it the scatter of its slice (guide_slices.hpp).

@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double least_wall_mm = 3, most_wall_mm = 25;
+bool is_a_wall(double thickness_mm) { return thickness_mm >= 3 && thickness_mm <= 25; }
 
 /// Between the four places around; nothing outside.
 std::optional<double> grey_at(const FineImage& image, const Vector2d& mm) {
@@ -40,8 +40,7 @@ std::optional<double> mean_between(const std::vector<double>& profile, double fr
   return sum / count;
 }
 
-}  // namespace
-
+/// Where a profile falls through a level for the first time from a sample on, in mm; nothing if it does not.
 std::optional<double> falls_through(const std::vector<double>& profile, double level, size_t from) {
   for (size_t i = std::max<size_t>(from, 1); i < profile.size(); ++i) {
     if (profile[i] >= level || profile[i - 1] < level) continue;
@@ -49,24 +48,6 @@ std::optional<double> falls_through(const std::vector<double>& profile, double l
   }
   return {};
 }
-
-FineImage fine_image(const CineSlice& slice, const Eigen::ArrayXXd& image) {
-  constexpr Eigen::Index finer = 4;  // linear weights between are then good to a hundredth of a pixel
-  return {zero_filled(image.cast<float>(), finer), slice.plane.row_spacing_mm / finer,
-          slice.plane.column_spacing_mm / finer};
-}
-
-std::vector<double> profile_of(const FineImage& image, const Vector2d& from, const Vector2d& direction) {
-  std::vector<double> profile;
-  for (double r = 0; r < ray_mm; r += ray_step_mm) {
-    const std::optional<double> grey = grey_at(image, from + r * direction);
-    if (!grey) break;
-    profile.push_back(*grey);
-  }
-  return profile;
-}
-
-namespace {
 
 /// Where a profile falls through the middle of what is seen to either side of an edge; nothing where it does not between two places.
 std::optional<double> half_way(const std::vector<double>& profile, const std::array<double, 2>& between_mm,
@@ -79,22 +60,49 @@ std::optional<double> half_way(const std::vector<double>& profile, const std::ar
 
 }  // namespace
 
+double edge_blur_mm(const SlicePlane& plane) {
+  return 1.5 * std::max(plane.column_spacing_mm, plane.row_spacing_mm);
+}
+
+FineImage fine_image(const CineSlice& slice, const Eigen::ArrayXXd& image) {
+  constexpr Eigen::Index finer = 4;  // linear weights between are then good to a hundredth of a pixel
+  // Beyond the last pixel lies what the first shows.
+  return {zero_filled(image.cast<float>(), finer)
+              .topLeftCorner(finer * (image.rows() - 1) + 1, finer * (image.cols() - 1) + 1),
+          slice.plane.row_spacing_mm / finer, slice.plane.column_spacing_mm / finer};
+}
+
+std::vector<double> profile_of(const FineImage& image, const Vector2d& from, const Vector2d& direction) {
+  std::vector<double> profile;
+  for (double r = 0; r < ray_mm; r += ray_step_mm) {
+    const std::optional<double> grey = grey_at(image, from + r * direction);
+    if (!grey) break;
+    profile.push_back(*grey);
+  }
+  return profile;
+}
+
 std::optional<WallOnRay> wall_on_ray(const CineSlice& slice, const std::vector<double>& profile) {
   const GreyLevels& levels = slice.levels;
   if (profile.empty() || profile[0] < levels.inner()) return {};
   const std::optional<double> inner = falls_through(profile, levels.inner(), 0);
   if (!inner) return {};
   const std::optional<double> outer = falls_through(profile, levels.outer(), sample_after(*inner));
-  if (!outer || *outer - *inner < least_wall_mm || *outer - *inner > most_wall_mm) return {};
+  if (!outer || !is_a_wall(*outer - *inner)) return {};
   // Between the two it is a wall: its middle third has the wall's level.
   const double third = (*outer - *inner) / 3;
   const std::optional<double> wall = mean_between(profile, *inner + third, *outer - third);
   if (!wall || *wall > levels.inner() || *wall < levels.outer()) return {};
-  const double blur_mm = 1.5 * std::max(slice.plane.column_spacing_mm, slice.plane.row_spacing_mm);
+  const double blur_mm = edge_blur_mm(slice.plane);
   const std::optional<double> blood = mean_between(profile, *inner - 2 * blur_mm, *inner - blur_mm);
   const std::optional<double> around = mean_between(profile, *outer + blur_mm, *outer + 2 * blur_mm);
-  return WallOnRay{half_way(profile, {*inner - blur_mm, *inner + third}, blood, wall).value_or(*inner),
-                   half_way(profile, {*outer - third, *outer + blur_mm}, wall, around).value_or(*outer)};
+  const WallOnRay found{half_way(profile, {*inner - blur_mm, *inner + third}, blood, wall).value_or(*inner),
+                        half_way(profile, {*outer - third, *outer + blur_mm}, wall, around).value_or(*outer)};
+  return is_a_wall(found.outer_mm - found.inner_mm) ? std::optional(found) : std::nullopt;
+}
+
+std::optional<double> end_of_wall(const CineSlice& slice, const std::vector<double>& profile) {
+  return falls_through(profile, slice.levels.outer(), 0);
 }
 
 }  // namespace diastole::imaging

@@ -15,7 +15,7 @@ Eigen::ArrayXXcf spectrum_of(const Image& image);
 double signed_bin(Eigen::Index bin, Eigen::Index count);
 
 /// The image between its pixels too, `finer` places a pixel each way, by zeros for the lines that were not measured: (finer * row, finer * column)
-/// is the pixel (row, column). Half-way edges of what a scanner images are displaced by up to a tenth of a pixel by linear or cubic weights.
+/// is the pixel (row, column). Periodic, as the transform is: beyond the last pixel the first follows.
 Image zero_filled(const Image& image, Eigen::Index finer);
 
 }  // namespace diastole::imaging

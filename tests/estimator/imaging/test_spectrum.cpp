@@ -29,11 +29,20 @@ TEST(ZeroFilled, IsTheWaveItselfBetweenItsPixels) {
       EXPECT_NEAR(fine(r, c), wave(static_cast<double>(r) / finer, static_cast<double>(c) / finer), 1e-5);
 }
 
+TEST(ZeroFilled, KeepsThePixelsOfAnyImage) {
+  const Image image = Image::Random(16, 14);
+  const Image fine = zero_filled(image, 4);
+  for (Eigen::Index r = 0; r < image.rows(); ++r)
+    for (Eigen::Index c = 0; c < image.cols(); ++c)
+      EXPECT_NEAR(fine(4 * r, 4 * c), image(r, c), 1e-5);
+}
+
 /// Where a row of the image falls through the middle of 2 and 1, in pixels.
 double edge_in(const Image& image, Eigen::Index row, Eigen::Index from) {
   const auto grey = [&](Eigen::Index column) { return static_cast<double>(image(row, column)); };
-  for (Eigen::Index c = from;; ++c)
+  for (Eigen::Index c = from; c < image.cols(); ++c)
     if (grey(c) < 1.5) return static_cast<double>(c - 1) + (grey(c - 1) - 1.5) / (grey(c - 1) - grey(c));
+  return 0;
 }
 
 TEST(SimulatedImage, ShowsAnEdgeWhereItIsWithinItsPixel) {
@@ -45,9 +54,11 @@ TEST(SimulatedImage, ShowsAnEdgeWhereItIsWithinItsPixel) {
     // Bright up to the edge at sample 32 * samples + shift; a pixel's centre is in the middle of its samples.
     scanner::Picture object = scanner::Picture::Ones(64 * samples, 64 * samples);
     object.leftCols(32 * samples + shift) = 2;
-    const Image image = scanner::acquired(object, protocol, 1);
     const double true_edge = 32 + static_cast<double>(shift) / samples - 0.5;
-    EXPECT_NEAR(edge_in(zero_filled(image, 4), 4 * 20, 4 * 25) / 4, true_edge, 0.01) << shift;
+    const Image across = zero_filled(scanner::acquired(object, protocol, 1), 4);
+    EXPECT_NEAR(edge_in(across, 4 * 20, 4 * 25) / 4, true_edge, 0.01) << shift;
+    const Image down = zero_filled(scanner::acquired(object.transpose(), protocol, 1), 4);
+    EXPECT_NEAR(edge_in(down.transpose(), 4 * 20, 4 * 25) / 4, true_edge, 0.01) << shift;
   }
 }
 

@@ -10,6 +10,7 @@
 #include <random>
 #include <tuple>
 
+#include "estimator/imaging/geometry/slab_edges.hpp"
 #include "estimator/imaging/geometry/ventricle_session.hpp"
 #include "estimator/imaging/geometry/wall_harmonics.hpp"
 #include "estimator/imaging/geometry/wall_map.hpp"
@@ -134,13 +135,43 @@ std::string clicks_on_a_held_base(int phases) {
 TEST(Ventricle, AHeldBaseInLaterPhasesBendsNoWallInTheFirst) {
   const VentricleFit fit = measured(clicks_on_a_held_base(8)).fit;
   const WallMap map(fit.frame, fit.phases[0]);
-  // Up to the base, beyond the last clicks; by one spectrum for all departures 0.3 mm.
+  // Up to the base, beyond the last clicks.
   for (const double z : {-30.0, -10.0, 5.0, 10.0, 15.0})
     for (const auto& [side, across, along] : {std::tuple(-0.5, 21.0, 51.0), {0.5, 30.0, 60.0}})
       EXPECT_NEAR(
           map.distance_mm(side, fit.frame.inside({across * std::sqrt(1 - z * z / (along * along)), 0, z})), 0,
           0.1)
           << z << " mm, side " << side;
+}
+
+TEST(SlabEdges, AreMovedToTheWallInTheMiddleOfTheirSlice) {
+  constexpr double thickness_mm = 8;
+  GuidePoints guide = guide_points_from_text(clicks_on_a_held_base(1), "heart.guide.csv");
+  std::vector<SlicePlane> planes(guide.slices.size());
+  const auto is_long = [&](size_t slice) { return guide.slices[slice].starts_with("la"); };
+  for (size_t s = 0; s < planes.size(); ++s) {
+    const double angle = is_long(s) ? std::numbers::pi * (guide.slices[s].back() - '0') / 3 : 0.0;
+    planes[s].along_row = {std::cos(angle), std::sin(angle), 0};
+    planes[s].along_column = is_long(s) ? Eigen::Vector3d::UnitZ() : Eigen::Vector3d::UnitY();
+    planes[s].thickness_mm = thickness_mm;
+  }
+  // Half of a round wall's section lies inside of where it is a quarter of the thickness beside the middle.
+  const GuidePoints exact = guide;
+  for (GuidePoint& point : guide.points) {
+    const double r = point.place_mm.head<2>().norm();
+    if (is_long(point.slice) && point.surface != GuideSurface::base && r > thickness_mm)
+      point.place_mm.head<2>() *= std::sqrt(1 - std::pow(thickness_mm / (4 * r), 2));
+  }
+  const GuidePoints seen = guide;
+  move_to_mid_slice(guide, fit_ventricle(guide), planes);
+  double furthest_seen_mm = 0;
+  for (size_t i = 0; i < guide.points.size(); ++i) {
+    if (std::abs(exact.points[i].place_mm.z()) > 12) continue;
+    furthest_seen_mm =
+        std::max(furthest_seen_mm, (seen.points[i].place_mm - exact.points[i].place_mm).norm());
+    EXPECT_LT((guide.points[i].place_mm - exact.points[i].place_mm).norm(), 0.02) << i;
+  }
+  EXPECT_GT(furthest_seen_mm, 0.09);
 }
 
 TEST(Ventricle, IsMeasuredInEveryPhaseFromClicksOfHalfAMillimetre) {

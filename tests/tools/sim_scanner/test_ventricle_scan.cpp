@@ -62,22 +62,40 @@ TEST_F(VentricleScan, WallsAndBaseAreFoundInItsCines) {
   EXPECT_GT(walls, 300);
 }
 
-TEST_F(VentricleScan, CoilsThatShadeDisplaceNoContour) {
-  protocol_.shading = 0.6;
-  scan_phases(4);
+struct Contour {
+  Eigen::Vector2d sum_mm = Eigen::Vector2d::Zero();
+  int points = 0;
+};
+using Contours = std::map<std::pair<std::string, imaging::GuideSurface>, Contour>;
+
+/// In the first phase's short-axis slices.
+Contours contours_in(const std::filesystem::path& folder) {
   const imaging::GuidePoints guide =
-      imaging::cine_guide_points(imaging::read_cines(imaging::read_image_folder(scratch_.path())));
-  struct Contour {
-    Eigen::Vector2d sum_mm = Eigen::Vector2d::Zero();
-    int points = 0;
-  };
-  std::map<std::pair<std::string, imaging::GuideSurface>, Contour> contours;
+      imaging::cine_guide_points(imaging::read_cines(imaging::read_image_folder(folder)));
+  Contours contours;
   for (const imaging::GuidePoint& point : guide.points) {
     if (point.phase > 0 || !guide.slices[point.slice].starts_with("sa")) continue;
     Contour& contour = contours[{guide.slices[point.slice], point.surface}];
     contour.sum_mm += point.place_mm.head<2>();
     ++contour.points;
   }
+  return contours;
+}
+
+TEST_F(VentricleScan, ImagesShowTheBodyWhereItIs) {
+  protocol_.shading = 0;
+  protocol_.snr = 1000;
+  protocol_.acquired = 1;
+  scan_phases(2);
+  for (const auto& [place, contour] : contours_in(scratch_.path()))
+    EXPECT_LT((contour.sum_mm / contour.points).norm(), 0.02)
+        << place.first << " of a hundredth of a pixel each way";
+}
+
+TEST_F(VentricleScan, CoilsThatShadeDisplaceNoContour) {
+  protocol_.shading = 0.6;
+  scan_phases(4);
+  const Contours contours = contours_in(scratch_.path());
   ASSERT_GE(contours.size(), 6U);
   for (const auto& [place, contour] : contours) {
     EXPECT_EQ(contour.points, 24) << place.first;
