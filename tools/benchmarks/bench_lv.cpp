@@ -35,7 +35,7 @@ using Eigen::Vector3d;
 struct Targets {
   double wall_mm, volume_percent, shift_mm, basal_shift_mm, seconds;
 };
-constexpr Targets of_clicks{0.25, 2, 0.3, 0.6, 5}, of_cines{0.15, 1, 0.15, 0.15, 10};
+constexpr Targets of_clicks{0.25, 2, 0.3, 0.6, 5}, of_cines{0.15, 1, 0.15, 0.15, 5};
 
 FigureTargets targets;
 
