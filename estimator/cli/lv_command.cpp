@@ -171,6 +171,10 @@ imaging::VentricleRequest checked_request(const VentricleArguments& arguments) {
   }
   if (!arguments.fibre_deg.empty()) request.fibre_deg = {arguments.fibre_deg[0], arguments.fibre_deg[1]};
   request.fit.estimate_shifts = !arguments.keep_slices;
+  if (const std::string ending = arguments.output.extension().string();
+      ending != ".mesh" && ending != ".toml")
+    throw InputError({arguments.output.string(), "--output", "is no name of a mesh",
+                      "Give heart.mesh, say; the tables are --volumes, --surface and --guide."});
   RequiredOutputs outputs({request.guide}, arguments.force);
   outputs.add(arguments.output, mesh_file_mark);
   outputs.add(arguments.surface, imaging::surface_file_mark);

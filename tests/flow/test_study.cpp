@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <chrono>
 #include <cmath>
 
 #include "protocol/signal/step_response.hpp"
@@ -135,21 +136,23 @@ TEST(Study, GoesOnWithTheNextSliceWhenItWasStopped) {
            progress.value("/schedule/phase"_json_pointer, "") == "waiting" &&
            progress.value("/schedule/slice"_json_pointer, -1) == slice;
   };
+  const auto wait_until = [&client](const auto& reached) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+    while (!reached() && std::chrono::steady_clock::now() < end) {
+    }
+    ASSERT_TRUE(reached()) << client.call("run.progress").dump();
+  };
   client.call("run.start", {{"experiment", study_toml}, {"file", "study.experiment.toml"}});
-  while (!waits_at(0)) {
-  }
+  wait_until([&] { return waits_at(0); });
   client.call("run.continue", {{"slice", 0}});
-  while (!waits_at(1)) {
-  }
+  wait_until([&] { return waits_at(1); });
   client.call("run.stop");
-  while (client.call("run.progress").at("state") != "done") {
-  }
+  wait_until([&] { return client.call("run.progress").at("state") == "done"; });
   EXPECT_EQ(client.call("run.progress").at("result").at("end"), "stopped_now");
   client.call("control.release");
 
   Program resumed(rig.place, resume);
-  while (!waits_at(1)) {
-  }
+  wait_until([&] { return waits_at(1); });
   client.call("run.continue", {{"slice", 1}});
   const Ended rest = resumed.wait();
   ASSERT_EQ(rest.exit_code, 0) << rest.err;

@@ -12,6 +12,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -61,16 +62,8 @@ double rms_mm(const imaging::WallMap& map, const imaging::ProlateFrame& frame, d
   return std::sqrt(squares / static_cast<double>(truth.size()));
 }
 
-imaging::GuidePoints clicks_of(const fs::path& folder, const std::string& name) {
-  return imaging::read_guide_points(folder / (name + ".guide.csv"));
-}
-
-imaging::GuidePoints found_in_cines(const fs::path& folder, const std::string&) {
-  return imaging::cine_guide_points(imaging::read_cines(imaging::read_image_folder(folder / "dicom")));
-}
-
-void score_case(const fs::path& folder, const std::string& name, const char* source,
-                decltype(clicks_of)* guide_of, const Targets& target) {
+void score_case(const fs::path& folder, const std::string& name, const char* source, const Targets& target,
+                const std::function<imaging::GuidePoints()>& read) {
   std::map<std::pair<int, bool>, std::vector<Vector3d>> walls;
   for (const auto& row : rows_of(folder / "truth" / (name + ".surfaces.csv")))
     walls[{std::stoi(row[0]), row[1] == "epi"}].emplace_back(std::stod(row[2]), std::stod(row[3]),
@@ -79,7 +72,7 @@ void score_case(const fs::path& folder, const std::string& name, const char* sou
   for (const auto& row : rows_of(folder / "truth" / (name + ".volumes.csv")))
     volumes[std::stoi(row[0])] = std::stod(row[2]);
   const auto start = std::chrono::steady_clock::now();
-  const imaging::GuidePoints guide = guide_of(folder / name, name);
+  const imaging::GuidePoints guide = read();
   const imaging::VentricleSession session = imaging::measure_ventricle({}, guide);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   fmt::print("{}, {}: points {:.3f} mm RMS from their walls, errors {:.2f} times those stated, {} s\n", name,
@@ -173,9 +166,13 @@ int main(int argc, char** argv) {
       return 0;
     }
     if (fs::exists(folder / "labels.json")) {
-      for (const char* name : {"cine-beat", "cine-shift"}) {
-        score_case(folder, name, "clicks", clicks_of, of_clicks);
-        score_case(folder, name, "cines", found_in_cines, of_cines);
+      for (const std::string name : {"cine-beat", "cine-shift"}) {
+        score_case(folder, name, "clicks", of_clicks,
+                   [&] { return imaging::read_guide_points(folder / name / (name + ".guide.csv")); });
+        score_case(folder, name, "cines", of_cines, [&] {
+          return imaging::cine_guide_points(
+              imaging::read_cines(imaging::read_image_folder(folder / name / "dicom")));
+        });
       }
     } else {
       fmt::print("no labelled hearts in {}\n", folder.string());

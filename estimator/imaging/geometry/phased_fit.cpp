@@ -5,14 +5,12 @@
 
 namespace diastole::imaging {
 
-PhasedFit::PhasedFit(const std::vector<PhaseEquations>& equations, Eigen::Index departures) {
+PhasedFit::PhasedFit(const std::vector<PhaseEquations>& equations, Eigen::Index departures)
+    : departures_(departures) {
   for (const PhaseEquations& e : equations) {
     Phase phase;
     phase.cc = e.common.transpose() * e.common;
-    phase.cd = phase.cc.leftCols(departures);
-    phase.dd = phase.cc.topLeftCorner(departures, departures);
     phase.cy = e.common.transpose() * e.y;
-    phase.dy = phase.cy.head(departures);
     phase.yy = e.y.squaredNorm();
     phase.rows = static_cast<double>(e.y.size());
     rows_ += e.y.size();
@@ -24,35 +22,35 @@ void PhasedFit::solve(const PhasedPrior& prior) {
   const double weight = 1 / prior.noise_variance;
   const Eigen::VectorXd common_precision = prior.common_variance.cwiseInverse();
   const Eigen::VectorXd departure_precision = prior.departure_variance.cwiseInverse();
-  const Eigen::Index departures = departure_precision.size();
   Eigen::MatrixXd information = common_precision.asDiagonal();
   Eigen::VectorXd right = Eigen::VectorXd::Zero(common_precision.size());
   for (Phase& phase : phases_) {
-    Eigen::MatrixXd own = weight * phase.dd;
+    const auto dc = phase.cc.topRows(departures_);
+    Eigen::MatrixXd own = weight * dc.leftCols(departures_);
     own.diagonal() += departure_precision;
-    phase.inverse = own.llt().solve(Eigen::MatrixXd::Identity(departures, departures));
-    phase.gain = weight * phase.inverse * phase.cd.transpose();
-    information += weight * (phase.cc - phase.cd * phase.gain);
-    right += weight * (phase.cy - phase.gain.transpose() * phase.dy);
+    phase.inverse = own.llt().solve(Eigen::MatrixXd::Identity(departures_, departures_));
+    phase.gain = weight * phase.inverse * dc;
+    information += weight * (phase.cc - dc.transpose() * phase.gain);
+    right += weight * (phase.cy - phase.gain.transpose() * phase.cy.head(departures_));
   }
   common_covariance_ =
       information.llt().solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
   common_ = common_covariance_ * right;
 
-  departure_squares_ = Eigen::VectorXd::Zero(departures);
+  departure_squares_ = Eigen::VectorXd::Zero(departures_);
   double squares = 0;
   // Of each unknown the data determine the share 1 - posterior / prior variance.
   double determined =
       static_cast<double>(common_.size()) - common_covariance_.diagonal().dot(common_precision);
   for (Phase& phase : phases_) {
-    phase.departure = weight * phase.inverse * phase.dy - phase.gain * common_;
+    phase.departure = weight * phase.inverse * phase.cy.head(departures_) - phase.gain * common_;
     const Eigen::VectorXd variance =
         phase.inverse.diagonal() + (phase.gain * common_covariance_).cwiseProduct(phase.gain).rowwise().sum();
     departure_squares_ += phase.departure.cwiseAbs2() + variance;
-    determined += static_cast<double>(departures) - variance.dot(departure_precision);
-    squares += phase.yy - 2 * (phase.cy.dot(common_) + phase.dy.dot(phase.departure)) +
-               common_.dot(phase.cc * common_) + phase.departure.dot(phase.dd * phase.departure) +
-               2 * common_.dot(phase.cd * phase.departure);
+    determined += static_cast<double>(departures_) - variance.dot(departure_precision);
+    Eigen::VectorXd all = common_;
+    all.head(departures_) += phase.departure;
+    squares += phase.yy - 2 * phase.cy.dot(all) + all.dot(phase.cc * all);
   }
   noise_square_ = squares + prior.noise_variance * determined;
 }

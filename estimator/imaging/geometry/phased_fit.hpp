@@ -4,7 +4,8 @@
 //
 //   y_p = C_p z + D_p d_p + noise,   noise ~ N(0, scale^2),  z_i ~ N(0, v_z[i]),  d_pj ~ N(0, v_d[j])
 //
-// z is common, d_p the departure of phase p from the first of them: D_p are the first columns of C_p, or none. Variances are infinite where nothing is known.
+// z is common, d_p the departure of phase p from the first of them: D_p are the first columns of C_p, or none.
+// Variances are infinite where nothing is known.
 // The posterior is exact (departures are eliminated phase by phase). Who calls it sets variances and noise from
 // `square_of_common`, `square_of_departures` and `noise_square`: the expectation step of EM (Dempster, Laird, Rubin 1977),
 // whose fixed point is the largest evidence.
@@ -52,13 +53,14 @@ class PhasedFit {
 
  private:
   struct Phase {
-    Eigen::MatrixXd cc, cd, dd;  // C'C, C'D, D'D
-    Eigen::VectorXd cy, dy;
+    Eigen::MatrixXd cc;  // C'C, whose first rows are D'C
+    Eigen::VectorXd cy;
     double yy = 0, rows = 0;
     Eigen::MatrixXd inverse;  // (D'D / scale^2 + 1 / v_d)^-1
     Eigen::MatrixXd gain;     // inverse D'C / scale^2
     Eigen::VectorXd departure;
   };
+  Eigen::Index departures_;
   std::vector<Phase> phases_;
   Eigen::Index rows_ = 0;
   Eigen::VectorXd common_;

@@ -249,7 +249,6 @@ class WallFit {
     prior.common_variance << variances(common_[0], wall_count), variances(common_[1], wall_count),
         Vector3d::Constant(std::numeric_limits<double>::infinity()),
         VectorXd::Constant(shifts_.size(), shift_variance_);
-    prior.departure_variance.resize(departures());
     if (has_departures()) prior.departure_variance = departure_variance_;
     prior.noise_variance = noise_variance_;
     return prior;

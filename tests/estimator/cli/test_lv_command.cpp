@@ -80,6 +80,10 @@ TEST(LvCommand, RefusesWithAReasonAndLeavesNothing) {
                                                 HasSubstr("\"two\""), HasSubstr("A row is")));
   EXPECT_THAT(refusal({(folder.path() / "none.csv").string(), "-o", mesh}), HasSubstr("none.csv"));
   EXPECT_THAT(refusal({guide, "-o", guide}), HasSubstr("ventricle.guide.csv"));
+  const std::string table = (folder.path() / "ventricle.csv").string();
+  EXPECT_THAT(refusal({guide, "-o", table}),
+              AllOf(HasSubstr("ventricle.csv"), HasSubstr("is no name of a mesh"), HasSubstr("--volumes")));
+  EXPECT_FALSE(std::filesystem::exists(table));
   EXPECT_THAT(refusal({guide, "-o", mesh, "--mesh", "2,2,1"}),
               AllOf(HasSubstr("--mesh"), HasSubstr("2,2,1")));
   EXPECT_THAT(refusal({guide, "-o", mesh, "--phase", "9"}),
