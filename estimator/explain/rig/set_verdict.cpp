@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 
 #include "estimator/explain/rig/changed_parts.hpp"
+#include "estimator/explain/rig/equation_errors.hpp"
 #include "estimator/explain/rig/held_out.hpp"
 #include "estimator/explain/rig/part_strain.hpp"
 #include "estimator/inference/tail_probability.hpp"
@@ -18,6 +20,7 @@ using Eigen::VectorXd;
 using Ids = std::vector<std::string>;
 
 constexpr double name_probability = 0.9;
+const double sure_odds = std::log(name_probability / (1.0 - name_probability));
 constexpr double least_probability = 0.05;     ///< of a set that is reported
 constexpr double irregular_by_chance = 0.001;  ///< that equal cycles differ by more than noise makes them
 
@@ -87,36 +90,57 @@ ChangeSize size_of_change(const rig::SessionProblem& problem, const EffectSet& s
 
 namespace {
 
-/// What a set's effects change each, over the model's error.
-Sizes sizes_of(const rig::SessionProblem& problem, const EffectSet& set, const ErrorKnowledge& known,
-               size_t given) {
-  Sizes sizes;
-  if (set.model.terms.empty()) return sizes;
+/// What each of a set's effects changes of the features, a column each.
+Eigen::MatrixXd changes_of(const rig::SessionProblem& problem, const EffectSet& set) {
   std::vector<rig::SessionModel> models{set.model};
+  size_t at = 0;
   for (size_t leave = 0; leave < set.model.terms.size(); ++leave) {
     rig::SessionModel without = set.model;
-    size_t at = 0;
-    for (size_t i = 0; i < leave; ++i)
-      at += set.model.terms[i].effect->parameters().size();
+    const size_t count = set.model.terms[leave].effect->parameters().size();
     const auto first = without.values.begin() + static_cast<std::ptrdiff_t>(at);
-    without.values.erase(
-        first, first + static_cast<std::ptrdiff_t>(set.model.terms[leave].effect->parameters().size()));
+    without.values.erase(first, first + static_cast<std::ptrdiff_t>(count));
     without.terms.erase(without.terms.begin() + static_cast<std::ptrdiff_t>(leave));
     models.push_back(std::move(without));
+    at += count;
   }
   const Eigen::MatrixXd shown = problem.predicted_features(models);
-  sizes.changed = VectorXd::Zero(shown.rows());
-  for (Index i = 1; i < shown.cols(); ++i) {
-    const ChangeSize size = size_of_change(problem, set, shown.col(0) - shown.col(i));
+  return -(shown.rightCols(shown.cols() - 1).colwise() - shown.col(0));
+}
+
+/// Is an effect that is small beside the others of its set more than an error of their equations? The set's odds against the one without
+/// it hold beside such errors.
+bool outlasts_equation_errors(const rig::SessionProblem& problem, const EffectSet& set,
+                              const Eigen::MatrixXd& changes, size_t effect, const WeighedSets& search) {
+  Ids others;
+  for (size_t i = 0; i < set.model.terms.size(); ++i)
+    if (i != effect) others.emplace_back(set.model.terms[i].effect->text().id);
+  std::ranges::sort(others);
+  double rival = -std::numeric_limits<double>::infinity();
+  for (const EffectSet& without : search.sets)
+    if (without.ids() == others && inference::is_settled(without.termination))
+      rival = std::max(rival, without.log_posterior);
+  return std::isfinite(rival) &&
+         set.log_posterior - rival - loss_beside_equation_errors(problem, set, changes, effect) > sure_odds;
+}
+
+/// What a set's effects change each, over the model's error.
+Sizes sizes_of(const rig::SessionProblem& problem, const EffectSet& set, const ErrorKnowledge& known,
+               const WeighedSets& search) {
+  Sizes sizes;
+  if (set.model.terms.empty()) return sizes;
+  const Eigen::MatrixXd changes = changes_of(problem, set);
+  sizes.changed = VectorXd::Zero(changes.rows());
+  for (Index i = 0; i < changes.cols(); ++i) {
+    const ChangeSize size = size_of_change(problem, set, changes.col(i));
     sizes.changed += size.squares;
     sizes.over_error.push_back(size.over_error);
-    sizes.material.push_back(static_cast<size_t>(i) <= given ||
+    sizes.material.push_back(static_cast<size_t>(i) < search.given ||
                              (size.over_error >= known.least_size() && !size.is_tolerance));
   }
-  // What is smaller beside it may be its own error.
   const double largest = *std::ranges::max_element(sizes.over_error);
-  for (size_t i = given; i < sizes.material.size(); ++i)
-    sizes.material[i] = sizes.material[i] && sizes.over_error[i] >= right_to * largest;
+  for (size_t i = search.given; i < sizes.material.size(); ++i)
+    sizes.material[i] = sizes.material[i] && (sizes.over_error[i] >= right_to * largest ||
+                                              outlasts_equation_errors(problem, set, changes, i, search));
   return sizes;
 }
 
@@ -248,7 +272,7 @@ GroupedSets grouped_by_material(const rig::SessionProblem& problem, const Weighe
   for (size_t k = 0; k < search.sets.size(); ++k) {
     if (search.probability[k] < considered) continue;
     Sizes& sizes = grouped.sizes[k];
-    sizes = sizes_of(problem, search.sets[k], error, search.given);
+    sizes = sizes_of(problem, search.sets[k], error, search);
     const Ids ids = material_ids(search.sets[k], sizes);
     grouped.groups.try_emplace(ids, Group{0.0, k}).first->second.probability += search.probability[k];
     for (size_t i = 0; i < sizes.material.size(); ++i) {
@@ -311,7 +335,7 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const WeighedSets& sea
   out.plain = without_effects(problem, search, best);
   const EffectSet& plain = search.sets[out.plain];
   const Sizes sizes =
-      out.chosen == group.best ? grouped.sizes[group.best] : sizes_of(problem, best, error, search.given);
+      out.chosen == group.best ? grouped.sizes[group.best] : sizes_of(problem, best, error, search);
   out.size_over_error = sizes.over_error;
   out.material = sizes.material;
   out.searches.push_back({{}, plain.termination});
@@ -342,12 +366,12 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const WeighedSets& sea
     list_rivals(out, grouped, search);
     return out;
   }
-  const double sure = std::log(name_probability / (1.0 - name_probability));
   const double odds =
-      is_more ? held_out_odds(*out.log_pseudo_bayes_factor, best.model.terms.size() - search.given) : sure;
-  const bool predicted = !is_more || odds > sure;
+      is_more ? held_out_odds(*out.log_pseudo_bayes_factor, best.model.terms.size() - search.given)
+              : sure_odds;
+  const bool predicted = !is_more || odds > sure_odds;
   const bool may_be_nothing_known =
-      odds > -sure || nothing_wrong_by_chance(problem, plain) > surprising_by_chance;
+      odds > -sure_odds || nothing_wrong_by_chance(problem, plain) > surprising_by_chance;
   if (!predicted && !out.tone && may_be_nothing_known) {
     out.verdict = Verdict::ambiguous;
     for (size_t k = 0; k < search.sets.size(); ++k)

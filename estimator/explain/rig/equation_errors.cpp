@@ -1,0 +1,86 @@
+#include "estimator/explain/rig/equation_errors.hpp"
+
+#include <cmath>
+#include <map>
+#include <tuple>
+
+namespace diastole::explain {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Features whose equation errors are alike: of a channel, of a kind, and of an octave, which is none at rest.
+using Likeness = std::tuple<rig::Signal, rig::FeatureKind, int>;
+
+Likeness likeness_of(const rig::FeatureBlock& block, const rig::Feature& feature) {
+  constexpr int at_rest = -1000;
+  const double cycle_s = block.cycles > 1.0 ? block.period_s : 2.0 * block.period_s;
+  const bool has_frequency = feature.kind == rig::FeatureKind::repeats && feature.harmonic > 0.0;
+  return {block.signal, feature.kind,
+          has_frequency ? static_cast<int>(std::lround(std::log2(feature.harmonic / cycle_s))) : at_rest};
+}
+
+/// What an error that is alike wherever the part acts may change, one sd a column.
+MatrixXd alike_errors(const rig::SegmentFeatures& features, const VectorXd& change) {
+  std::map<Likeness, VectorXd> columns;
+  for (const rig::FeatureBlock& block : features.blocks())
+    for (size_t i = 0; i < block.features.size(); ++i) {
+      const auto row = static_cast<Index>(block.first + i);
+      VectorXd& column =
+          columns.try_emplace(likeness_of(block, block.features[i]), VectorXd::Zero(change.size()))
+              .first->second;
+      column[row] = right_to * change[row];
+    }
+  MatrixXd all(change.size(), static_cast<Index>(columns.size()));
+  Index at = 0;
+  for (const auto& [likeness, column] : columns)
+    all.col(at++) = column;
+  return all;
+}
+
+/// The columns of a set's linear unknowns (values, moments, nuisances) but those of one effect.
+std::vector<Index> columns_without(const EffectSet& set, size_t effect) {
+  std::vector<Index> kept;
+  Index at = 0;
+  const auto keep = [&](size_t term, size_t count) {
+    for (size_t i = 0; i < count; ++i, ++at)
+      if (term != effect) kept.push_back(at);
+  };
+  const auto& terms = set.model.terms;
+  for (size_t term = 0; term < terms.size(); ++term)
+    keep(term, terms[term].effect->parameters().size());
+  for (size_t term = 0; term < terms.size(); ++term)
+    keep(term, terms[term].change_points.size());
+  keep(terms.size(), static_cast<size_t>(set.columns.cols() - at));
+  return kept;
+}
+
+}  // namespace
+
+double loss_beside_equation_errors(const rig::SessionProblem& problem, const EffectSet& set,
+                                   const MatrixXd& changes, size_t effect) {
+  rig::ModelError error = problem.error();
+  MatrixXd repeated(changes.rows(), 0);
+  for (Index other = 0; other < changes.cols(); ++other) {
+    if (other == static_cast<Index>(effect)) continue;
+    error.noise += right_to * right_to * changes.col(other).cwiseAbs2();
+    const MatrixXd errors = alike_errors(problem.features(), changes.col(other));
+    repeated.conservativeResize(Eigen::NoChange, repeated.cols() + errors.cols());
+    repeated.rightCols(errors.cols()) = errors;
+  }
+  const VectorXd without_it = set.target() + changes.col(static_cast<Index>(effect));
+  const MatrixXd other_columns = set.columns(Eigen::all, columns_without(set, effect));
+  const auto gain = [&](const rig::ModelError& of, const MatrixXd& errors) {
+    const auto chi_square = [&](const VectorXd& target, const MatrixXd& columns) {
+      MatrixXd all(columns.rows(), columns.cols() + errors.cols());
+      all << columns, errors;
+      return fit_linear(target, all, of, set.evidence.shares).chi_square;
+    };
+    return 0.5 * (chi_square(without_it, other_columns) - chi_square(set.target(), set.columns));
+  };
+  return gain(problem.error(), MatrixXd(changes.rows(), 0)) - gain(error, repeated);
+}
+
+}  // namespace diastole::explain

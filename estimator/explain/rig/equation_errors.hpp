@@ -1,0 +1,21 @@
+#pragma once
+// Errors of effects' equations. A real part does what an effect's equations say to a tenth (right_to); what it does otherwise is in
+// part alike wherever it acts, and in part another thing with each waveform:
+//
+//   e = 0.1 (sum_b a_b d_b + n o d),   a_b, n ~ N(0, 1)
+//
+// d: what the effect changes of the features; d_b: of those of one kind in one channel, within an octave of frequency. So an effect that is
+// small beside another may be nothing but that one's error, unless it acts where the other does not.
+
+#include <Eigen/Dense>
+
+#include "estimator/explain/rig/effect_sets.hpp"
+
+namespace diastole::explain {
+
+/// By how much less ln likelihood one effect of a set gains where the equations of the others err so. `changes`: what each of the set's
+/// effects changes of the features, a column each.
+double loss_beside_equation_errors(const rig::SessionProblem& problem, const EffectSet& set,
+                                   const Eigen::MatrixXd& changes, size_t effect);
+
+}  // namespace diastole::explain
