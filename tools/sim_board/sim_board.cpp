@@ -133,13 +133,13 @@ void SimBoard::set_supply_mV(uint32_t supply_mV) {
   board.chip.flash.set_supply_mV(supply_mV);
   board.chip.adc.set_supply_mV(supply_mV);
   board.supply_V = 1e-3 * supply_mV;
-  if (board.powered && supply_mV < board.chip.flash.brown_out_mV()) {
+  if (board.powered && supply_mV < board.chip.flash.brown_out().falling_mV) {
     power_off();
     board.browned_out = true;
   }
   if (!board.browned_out) return;
   if (supply_mV < ram_keeps_mV) board.chip.memory.forget_ram();
-  if (supply_mV < board.chip.flash.brown_out_mV()) return;
+  if (supply_mV < board.chip.flash.brown_out().rising_mV) return;
   board.browned_out = false;
   board.powered = true;
   board.power_fails = false;

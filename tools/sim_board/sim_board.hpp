@@ -140,8 +140,9 @@ class SimBoard {
   /// Power fails in the middle of flash operation `operation` (1 is the next one); nullopt: never.
   void cut_power_at_flash_operation(std::optional<uint64_t> operation);
 
-  /// The supply from now on. Below the brown-out threshold of the option bytes (1.7 V without one) the chip is held in
-  /// reset, outputs off, until it is above again; below 1.7 V RAM forgets. Flash operations below 2.7 V leave marginal cells.
+  /// The supply from now on. Below the brown-out threshold of the option bytes (level 3: 2.83 V; 1.68 V without one) the chip is
+  /// held in reset, outputs off, until it has risen some 0.1 V above it (2.92 V; 1.72 V); below 1.7 V RAM forgets. Flash
+  /// operations below 2.7 V leave marginal cells.
   void set_supply_mV(uint32_t supply_mV);
   /// Words of flash with cells that each power-up reads anew.
   [[nodiscard]] std::size_t marginal_words() const;

@@ -1,6 +1,7 @@
 #pragma once
-// What the chip must keep outside of its programs (RM0090 3.6): brown-out reset level 3, which holds the chip below 2.7 V,
-// the least that flash is written at; and the bootloader's sector write-protected, so that no program replaces it.
+// What the chip must keep outside of its programs (RM0090 3.6): brown-out reset level 3, which resets the chip when the supply
+// falls to 2.75 to 2.88 V, 2.83 typically, before the 2.7 V that flash is written at, and lets it go at 2.85 to 2.97 V (datasheet
+// table 19); and the bootloader's sector write-protected, so that no program replaces it.
 
 namespace diastole::stm32 {
 

@@ -1,6 +1,7 @@
 #pragma once
 // Whether the supply is high enough for the flash: programming 32 bits at a time needs 2.7 V (datasheet table 39). The
-// voltage detector's threshold 6 lies at 2.85 V at least when the supply falls (datasheet table 19, PLS = 110).
+// voltage detector's threshold 6 (datasheet table 19, PLS = 110) lies at 2.85 to 2.99 V, 2.93 typically, when the supply falls,
+// and 0.1 V higher when it rises: above the brown-out reset's 2.75 to 2.88 V (option_bytes.hpp), below a sound supply's 3.2 V.
 
 #include "firmware/boards/stm32f405/registers.hpp"
 

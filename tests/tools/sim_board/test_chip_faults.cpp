@@ -62,13 +62,31 @@ TEST_F(ChipFaults, NoFlashIsWrittenWhileTheSupplyIsLow) {
   bench->connect();
   client().write_settings(ChipBench::numbered(1));
   const auto before = board().statistics().flash_operations;
-  board().set_supply_mV(2'750);  // above the brown-out reset, below the detector
-  EXPECT_THROW(client().write_settings(ChipBench::numbered(2)), HardwareError);
+  // Above the brown-out reset, below the detector's threshold as the supply falls, and as it rises.
+  for (const uint32_t low_mV : {2'880U, 2'990U}) {
+    board().set_supply_mV(low_mV);
+    EXPECT_THROW(client().write_settings(ChipBench::numbered(2)), HardwareError) << low_mV;
+  }
   EXPECT_EQ(board().statistics().flash_operations, before);
   EXPECT_EQ(board().marginal_words(), 0U);
   board().set_supply_mV(3'300);
   client().write_settings(ChipBench::numbered(3));
   EXPECT_EQ(client().settings().settings.backlash_nm, 3);
+}
+
+/// Between the thresholds of datasheet table 19: 2.83 V falling, 2.92 V rising.
+TEST_F(ChipFaults, ABrownOutHoldsTheChipUntilTheSupplyIsWellAboveIt) {
+  power();
+  bench->connect();
+  constexpr std::pair<uint32_t, bool> runs_at_mV[] = {{2'840, true},  {2'820, false}, {2'840, false},
+                                                      {2'910, false}, {2'930, true},  {2'840, true}};
+  for (const auto& [supply_mV, runs] : runs_at_mV) {
+    board().set_supply_mV(supply_mV);
+    EXPECT_EQ(board().powered(), runs) << supply_mV;
+  }
+  board().set_supply_mV(3'300);
+  bench->connect();
+  EXPECT_EQ(client().status().state, wire::State::unhomed);
 }
 
 /// At moments one after the other, and where a word was seen to begin being programmed, which takes 16 us.

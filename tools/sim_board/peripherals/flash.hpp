@@ -141,10 +141,15 @@ class Flash final : public RegisterBlock {
   }
   [[nodiscard]] uint64_t broken_off() const { return broken_off_; }
   [[nodiscard]] std::size_t marginal_words() const { return marginal_.size(); }
-  /// Below it the brown-out reset holds the chip, as the options say that counted since the last reset.
-  [[nodiscard]] uint32_t brown_out_mV() const {
-    constexpr uint32_t levels_mV[] = {2700, 2400, 2100, 1700};  // BOR level 3, 2, 1, off: power-on reset
-    return levels_mV[loaded_options_ >> 2 & 3];
+  /// A supply that falls below the first is held in reset until it has risen to the second.
+  struct BrownOut {
+    uint32_t falling_mV, rising_mV;
+  };
+  /// As the options say that counted since the last reset; thresholds typical, datasheet table 19.
+  [[nodiscard]] BrownOut brown_out() const {
+    constexpr BrownOut levels[] = {
+        {2830, 2920}, {2500, 2590}, {2190, 2290}, {1680, 1720}};  // BOR level 3, 2, 1, off: power-on reset
+    return levels[loaded_options_ >> 2 & 3];
   }
   [[nodiscard]] uint32_t option_bytes() const { return options_; }
 
