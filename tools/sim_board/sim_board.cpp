@@ -162,6 +162,10 @@ void SimBoard::hold_core(bool held) {
 
 void SimBoard::stick_dma(uint32_t stream) { board_->chip.dma1.stick(stream); }
 void SimBoard::fail_crystal() { board_->chip.rcc.fail_crystal(); }
+void SimBoard::stall_after_store(uint32_t address, uint64_t time_ns) {
+  board_->chip.cpu.stall_after_store(address, board_->chip.clock.cycles_in(time_ns));
+}
+
 
 void SimBoard::power_off() {
   board_->powered = false;

@@ -152,6 +152,8 @@ class SimBoard {
   [[nodiscard]] uint32_t flash_access_control() const;
   /// From now on the stream of DMA1 brings nothing and cannot be switched off, until a reset.
   void stick_dma(uint32_t stream);
+  /// When the program next stores to the register at `address`, the core stands still behind it for so long; all else goes on.
+  void stall_after_store(uint32_t address, uint64_t time_ns);
   /// The crystal stops for good.
   void fail_crystal();
   /// A debugger stops the core, or lets it go on. The peripherals run on, but for a watchdog that the firmware has bound to it.

@@ -71,8 +71,10 @@ void PulseTimer::raise_ttl(std::uint32_t tick, Ticks width) {
   ttl_rising_ = true;
   ttl_seen_active_ = false;
   tim2().CCR2.write(tick);
-  clear_flag(kCompare2);
+  // The mode before the flag: a match that comes before the mode is forgotten, and made good below; one that comes between them is
+  // forgotten too, but has raised the pin, which stays as it is.
   set_ttl_mode(kActiveOnMatch);
+  clear_flag(kCompare2);
   if (has_passed(tick) && (tim2().SR.read() & kCompare2) == 0) {
     // The match has been missed: a late trigger, reported as such, is better than none that is counted.
     set_ttl_mode(kHigh);

@@ -1,6 +1,6 @@
 #pragma once
-// Three cycles of a hold with delayed triggers, run by the real image, while a debugger holds the core about the beginning of
-// the second: its trigger's compare value is written late.
+// Three cycles of a hold with delayed triggers, run by the real image and disturbed about the beginning of the second: a debugger
+// holds the core, so that its trigger's compare value is written late; or the core stands still between two stores.
 
 #include <cmath>
 #include <cstdint>
@@ -41,8 +41,9 @@ struct HeldTriggers {
   static constexpr double capture_ns = 60;
 };
 
-/// Held from `before_ns` before the second cycle begins, for `held_ns`.
-inline HeldTriggers run_with_held_core(uint64_t before_ns, uint64_t held_ns) {
+/// `disturb(board, pass)` comes `before_ns` before the second cycle begins; pass(time_ns) lets the board go on.
+template <class Disturb>
+HeldTriggers run_disturbed(uint64_t before_ns, const Disturb& disturb) {
   HeldTriggers found;
   EmulatedController controller({read_image(firmware)});
   MiniatureHost host(controller);
@@ -74,15 +75,29 @@ inline HeldTriggers run_with_held_core(uint64_t before_ns, uint64_t held_ns) {
     host.slice_ns = slice_ns;
   };
   run_to(rises().front() - uint64_t{HeldTriggers::delay_us} * 1000 + HeldTriggers::period_ns - before_ns);
-  controller.board().hold_core(true);
-  run_to(host.now_ns() + held_ns);
-  controller.board().hold_core(false);
+  disturb(controller.board(), [&](uint64_t time_ns) { run_to(host.now_ns() + time_ns); });
   found.ended = host.run_until([&] { return host.ended.has_value(); }, 10'000'000'000);
   host.run_for(100'000'000);
   found.rises_ns = rises();
   found.triggers = host.triggers;
   found.counted = host.ended ? host.ended->triggers : 0;
   return found;
+}
+
+/// Held from `before_ns` before the second cycle begins, for `held_ns`.
+inline HeldTriggers run_with_held_core(uint64_t before_ns, uint64_t held_ns) {
+  return run_disturbed(before_ns, [held_ns](SimBoard& board, const auto& pass) {
+    board.hold_core(true);
+    pass(held_ns);
+    board.hold_core(false);
+  });
+}
+
+/// The core stands still behind the second cycle's first store to the register at `address`, for `stalled_ns`.
+inline HeldTriggers run_with_stalled_store(uint32_t address, uint64_t stalled_ns) {
+  constexpr uint64_t before_ns = 20'000;
+  return run_disturbed(before_ns,
+                       [=](SimBoard& board, const auto&) { board.stall_after_store(address, stalled_ns); });
 }
 
 }  // namespace diastole::sim_board_test

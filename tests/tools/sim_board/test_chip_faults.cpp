@@ -234,6 +234,24 @@ TEST_F(ChipFaults, ATriggerThatComesTooLateIsRaisedAndToldWithItsOwnTime) {
   }
 }
 
+/// The match comes between two stores of those that order a trigger: to its compare value, its mode, its flag.
+TEST_F(ChipFaults, ATriggerWhoseMatchComesWhileItIsOrderedRises) {
+  constexpr uint32_t mode = 0x4000'0018, flag = 0x4000'0010, compare_value = 0x4000'0038;  // TIM2
+  constexpr uint64_t stalled_us = 150;
+  constexpr int64_t late_us = stalled_us - HeldTriggers::delay_us;
+  for (const uint32_t store : {compare_value, mode, flag}) {
+    const HeldTriggers found = run_with_stalled_store(store, stalled_us * 1000);
+    ASSERT_EQ(found.rises_ns.size(), HeldTriggers::cycles) << std::hex << store;
+    EXPECT_TRUE(found.reported()) << std::hex << store;
+    if (store != compare_value) {
+      EXPECT_EQ(found.late_ns(), 0) << std::hex << store;
+    } else {
+      EXPECT_GT(found.late_ns(), late_us * 1000) << "before the mode: it is raised behind the stall";
+      EXPECT_LT(found.late_ns(), (late_us + 10) * 1000);
+    }
+  }
+}
+
 TEST_F(ChipFaults, ATtlPinThatIsHeldLowLosesEveryTriggerAndIsReported) {
   EmulatedController controller({read_image(firmware)});
   MiniatureHost host(controller);

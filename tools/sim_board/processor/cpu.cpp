@@ -283,8 +283,14 @@ uint64_t Cpu::on_read(uc_engine*, uint64_t offset, unsigned bytes, void* self) {
 
 void Cpu::on_write(uc_engine*, uint64_t offset, unsigned bytes, uint64_t value, void* self) {
   const Window& window = *static_cast<Window*>(self);
-  window.cpu->parts_.bus.write(window.base + static_cast<uint32_t>(offset), static_cast<uint32_t>(value),
-                               bytes);
+  Cpu& cpu = *window.cpu;
+  const uint32_t address = window.base + static_cast<uint32_t>(offset);
+  cpu.parts_.bus.write(address, static_cast<uint32_t>(value), bytes);
+  if (!cpu.stall_ || cpu.stall_->address != address) return;
+  Clock& clock = cpu.parts_.clock;
+  clock.set_now(clock.now() + cpu.stall_->cycles);
+  cpu.stall_.reset();
+  cpu.parts_.scheduler.run_until(clock.now());
 }
 
 void Cpu::run_until(Cycles limit) {

@@ -4,12 +4,13 @@
 //
 // One instruction is one cycle, and what flash_access.hpp says of the flash's wait states comes on top. Code runs block by block (up to the next branch, and never over a page); at
 // each block's start time is brought up to date, events that are due happen, and an exception may be taken. A
-// register access therefore happens at the time of its block's start and an exception is taken up to a block
-// late; what timers do is exact. Stacking costs 12 cycles, unstacking 10, tail-chaining 6.
+// register access therefore happens at the time of its block's start (but for stall_after_store()) and an exception is taken up to a
+// block late; what timers do is exact. Stacking costs 12 cycles, unstacking 10, tail-chaining 6.
 
 #include <unicorn/unicorn.h>
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "tools/sim_board/core/bus.hpp"
@@ -51,6 +52,9 @@ class Cpu {
 
   /// Ends run_until() at the next boundary: a reset or loss of power is to be dealt with.
   void interrupt();
+
+  /// The core stands still for so long behind the program's next store to this register; what is due meanwhile happens.
+  void stall_after_store(uint32_t address, Cycles cycles) { stall_ = Stall{address, cycles}; }
 
   /// Flash changed under the code.
   void forget_code(uint32_t offset, uint32_t bytes);
@@ -120,6 +124,11 @@ class Cpu {
   static uint64_t on_read(uc_engine*, uint64_t offset, unsigned bytes, void* self);
   static void on_write(uc_engine*, uint64_t offset, unsigned bytes, uint64_t value, void* self);
 
+  struct Stall {
+    uint32_t address;
+    Cycles cycles;
+  };
+
   /// A mapped range of registers; Unicorn passes offsets only.
   struct Window {
     Cpu* cpu;
@@ -146,6 +155,7 @@ class Cpu {
   uint64_t instructions_ = 0;
   Cycles asleep_cycles_ = 0;
   uint32_t return_magic_ = 0;
+  std::optional<Stall> stall_;
   bool interrupted_ = false, asleep_ = false, locked_up_ = false, held_ = false;
   std::string last_fault_;
   struct {
