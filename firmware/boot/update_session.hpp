@@ -21,7 +21,7 @@ class UpdateSession {
  public:
   explicit UpdateSession(S& store) : store_(store) {}
 
-  /// Keeps what the free slot holds of this image, or erases it and writes the header.
+  /// Keeps what the free slot holds of this image, or erases it; writes the header.
   UpdateReply begin(const wire::BeginUpdate& request);
   UpdateReply add(const wire::UpdateData& data);
   /// Reads the image back; if it verifies, it is recorded as installed: the next start tries it.
@@ -43,7 +43,7 @@ class UpdateSession {
   [[nodiscard]] bool still_erased() const {
     return last_of_slot(store_.records(), slot_) == BootEvent::erased && is_erased(store_.slot(slot_));
   }
-  bool prepare_slot(const wire::BeginUpdate& request);
+  bool prepare_slot();
   bool compact_records(const BootDecision& decision);
 
   S& store_;
@@ -90,18 +90,24 @@ UpdateReply UpdateSession<S>::begin(const wire::BeginUpdate& request) {
   if (judged.outcome == done) judged = judge_signature(sent, decision);
   if (judged.outcome != done) return refuse(judged.outcome, judged.value);
   if (!store_.supply_sound()) return refuse(supply_low);
-  if (std::equal(sent.begin(), sent.begin() + request.header_bytes, store_.slot(slot_).begin()) &&
+  const std::span sent_header = std::span(request.header).first(request.header_bytes);
+  if (std::equal(sent_header.begin(), sent_header.end(), store_.slot(slot_).begin()) &&
       !erase_interrupted(store_.records(), slot_)) {
     held_ = held_code(store_.slot(slot_), header->code_bytes);
-  } else if (!prepare_slot(request)) {
+  } else if (!prepare_slot()) {
     return refuse(flash_failed, 0);
   }
+  // The header last: where there is one, its signature is whole. Also over one that stands: a cut may have hit its writing,
+  // and cells that read as they should may not be so.
+  if (!store_.write_slot(slot_, wire::kImageSignatureAt, sent_header.subspan(wire::kImageSignatureAt)) ||
+      !store_.write_slot(slot_, 0, sent_header.first(wire::kImageHeaderBytes)))
+    return refuse(flash_failed, 0);
   image_ = header;
   return {};
 }
 
 template <SlotStore S>
-bool UpdateSession<S>::prepare_slot(const wire::BeginUpdate& request) {
+bool UpdateSession<S>::prepare_slot() {
   // A sector of records whose own erase was cut off has no whole record at its beginning, which is written last.
   const bool records_sound = decode_record(store_.records().template first<kRecordBytes>()).has_value();
   if (!still_erased()) {
@@ -110,11 +116,7 @@ bool UpdateSession<S>::prepare_slot(const wire::BeginUpdate& request) {
     (void)append(store_, {BootEvent::erased, slot_, {}});
   }
   const bool compacted = !records_sound || records_left(store_.records()) < kRecordsNeeded;
-  if (compacted && !compact_records(decide(store_))) return false;
-  // The header last: where there is one, its signature is whole.
-  const std::span sent = std::span(request.header).first(request.header_bytes);
-  return store_.write_slot(slot_, wire::kImageSignatureAt, sent.subspan(wire::kImageSignatureAt)) &&
-         store_.write_slot(slot_, 0, sent.first(wire::kImageHeaderBytes));
+  return !compacted || compact_records(decide(store_));
 }
 
 /// Precondition: the free slot is erased. Then only one image is left to start, whatever the records say: they

@@ -41,6 +41,7 @@ namespace diastole::wire {
 inline constexpr std::size_t kImageHeaderBytes = 64;
 inline constexpr std::size_t kImageHeaderArea = 512;
 inline constexpr std::uint16_t kImageHeaderVersion = 1;
+inline constexpr std::size_t kCodeBytesAt = 12;
 
 struct FirmwareVersion {
   std::uint8_t major = 0, minor = 0, patch = 0;
@@ -93,7 +94,7 @@ constexpr ImageHeaderBytes encode(const ImageHeader& header) {
   detail::put_little(out.subspan(4), kImageHeaderVersion);
   detail::put_little(out.subspan(6), header.board_id);
   detail::put_little(out.subspan(8), header.link_address);
-  detail::put_little(out.subspan(12), header.code_bytes);
+  detail::put_little(out.subspan(kCodeBytesAt), header.code_bytes);
   bytes[16] = header.version.major;
   bytes[17] = header.version.minor;
   bytes[18] = header.version.patch;
@@ -114,7 +115,7 @@ constexpr std::optional<ImageHeader> decode_image_header(
   ImageHeader header;
   header.board_id = detail::get_little<std::uint16_t>(bytes.subspan(6));
   header.link_address = detail::get_little<std::uint32_t>(bytes.subspan(8));
-  header.code_bytes = detail::get_little<std::uint32_t>(bytes.subspan(12));
+  header.code_bytes = detail::get_little<std::uint32_t>(bytes.subspan(kCodeBytesAt));
   header.version = {bytes[16], bytes[17], bytes[18]};
   header.build_id = detail::get_little<std::uint64_t>(bytes.subspan(20));
   std::copy_n(bytes.begin() + detail::kHashedHeaderBytes, header.sha256.size(), header.sha256.begin());

@@ -80,7 +80,7 @@ TEST(Faults, CutErase) {
     if (!running || running->slot == wire::ImageSlot::none) return false;
     if (!verifies(bench.board().flash(), running->slot)) return false;
     if (!bench.flash(newer_update).verified) return false;
-    // Cells that are read anew at each start may be left in the records, whose digests do not hold then; not in an image.
+    // Cells that are read anew at each reset may be left in the records, whose digests do not hold then; not in an image.
     for (int start = 0; start < 3; ++start) {
       bench.power_cycle();
       const auto again = bench.running();

@@ -65,6 +65,7 @@ class Chip {
   void reset(ResetCause cause) {
     rcc.record(cause);
     bus.reset_all();
+    flash.read_marginal_cells();
     nvic.reset();
     cpu.reset();
   }

@@ -122,7 +122,6 @@ void SimBoard::power_on() {
   if (std::exchange(board_->powered, true)) return;
   board_->power_fails = false;
   board_->chip.memory.forget_ram();
-  board_->chip.flash.read_marginal_cells();
   board_->reset(ResetCause::power);
 }
 
@@ -143,11 +142,14 @@ void SimBoard::set_supply_mV(uint32_t supply_mV) {
   board.browned_out = false;
   board.powered = true;
   board.power_fails = false;
-  board.chip.flash.read_marginal_cells();
   board.reset(ResetCause::power);
 }
 
 std::size_t SimBoard::marginal_words() const { return board_->chip.flash.marginal_words(); }
+
+void SimBoard::make_marginal(uint32_t address, uint32_t bits) {
+  board_->chip.flash.make_marginal(address - board_model::flash_base, bits);
+}
 
 uint32_t SimBoard::option_bytes() const { return board_->chip.flash.option_bytes(); }
 
@@ -160,12 +162,12 @@ void SimBoard::hold_core(bool held) {
   chip.watchdog.hold(held && (chip.bus.read(apb1_freeze, 4) & watchdog_stops) != 0);
 }
 
-void SimBoard::stick_dma(uint32_t stream) { board_->chip.dma1.stick(stream); }
-void SimBoard::fail_crystal() { board_->chip.rcc.fail_crystal(); }
 void SimBoard::stall_after_store(uint32_t address, uint64_t time_ns) {
   board_->chip.cpu.stall_after_store(address, board_->chip.clock.cycles_in(time_ns));
 }
 
+void SimBoard::stick_dma(uint32_t stream) { board_->chip.dma1.stick(stream); }
+void SimBoard::fail_crystal() { board_->chip.rcc.fail_crystal(); }
 
 void SimBoard::power_off() {
   board_->powered = false;

@@ -144,16 +144,18 @@ class SimBoard {
   /// held in reset, outputs off, until it has risen some 0.1 V above it (2.92 V; 1.72 V); below 1.7 V RAM forgets. Flash
   /// operations below 2.7 V leave marginal cells.
   void set_supply_mV(uint32_t supply_mV);
-  /// Words of flash with cells that each power-up reads anew.
+  /// Words of flash with cells that each reset reads anew.
   [[nodiscard]] std::size_t marginal_words() const;
+  /// These bits of a word of flash are of that kind from now on. Precondition: `address` is a multiple of 4, in flash.
+  void make_marginal(uint32_t address, uint32_t bits);
   /// The user option bytes as OPTCR shows them, bits 2 to 27.
   [[nodiscard]] uint32_t option_bytes() const;
   /// FLASH_ACR: wait states, caches, prefetch.
   [[nodiscard]] uint32_t flash_access_control() const;
-  /// From now on the stream of DMA1 brings nothing and cannot be switched off, until a reset.
-  void stick_dma(uint32_t stream);
   /// When the program next stores to the register at `address`, the core stands still behind it for so long; all else goes on.
   void stall_after_store(uint32_t address, uint64_t time_ns);
+  /// From now on the stream of DMA1 brings nothing and cannot be switched off, until a reset.
+  void stick_dma(uint32_t stream);
   /// The crystal stops for good.
   void fail_crystal();
   /// A debugger stops the core, or lets it go on. The peripherals run on, but for a watchdog that the firmware has bound to it.

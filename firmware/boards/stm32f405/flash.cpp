@@ -15,6 +15,8 @@ constexpr std::uint32_t kErrors = 0xF0, kEndOfOperation = 1U << 0, kBusy = 1U <<
 // FLASH_ACR, 3.9.1
 constexpr std::uint32_t kCaches = 3U << 9, kCacheReset = 3U << 11;
 
+constexpr std::uint32_t kErased = 0xFFFF'FFFF;
+
 /// The interface takes orders while one of these lives. The caches are emptied at the end: they may hold what
 /// was there before.
 class Unlocked {
@@ -59,7 +61,7 @@ FlashFault erase(const FlashSector& sector) {
     if (!Unlocked::done()) return FlashFault::refused;
   }
   for (std::uint32_t offset = 0; offset < sector.bytes; offset += 4)
-    if (word_at(sector.address + offset) != 0xFFFF'FFFF) return FlashFault::verify_failed;
+    if (word_at(sector.address + offset) != kErased) return FlashFault::verify_failed;
   return FlashFault::none;
 }
 
@@ -70,7 +72,7 @@ FlashFault program(std::uint32_t address, std::span<const std::uint32_t> words) 
     for (const std::uint32_t word : words) {
       volatile std::uint32_t& place = word_at(at);
       at += 4;
-      if (place == word) continue;
+      if (word == kErased && place == word) continue;
       if ((place & word) != word) return FlashFault::not_erased;
       if (!supply_suffices()) return FlashFault::supply_low;
       place = word;

@@ -29,8 +29,9 @@ enum class FlashFault : std::uint8_t {
 /// Makes every byte of the sector 0xFF.
 [[nodiscard]] FlashFault erase(const FlashSector& sector);
 
-/// Programs words one after the other and reads them back; words that already hold their value are left
-/// alone. Stops at the first fault. Precondition: `address` is a multiple of 4.
+/// Programs words one after the other and reads them back; words that stay erased are left alone, others are programmed
+/// even if they read as they should: a cut may have hit them, and their cells read so by chance. Stops at the first fault.
+/// Precondition: `address` is a multiple of 4.
 [[nodiscard]] FlashFault program(std::uint32_t address, std::span<const std::uint32_t> words);
 
 /// The sector as it reads now.

@@ -1,6 +1,6 @@
 #include "firmware/boards/stm32f405/hand_over.hpp"
 
-#include <bit>
+#include <array>
 #include <cstddef>
 
 #include "firmware/boards/stm32f405/registers.hpp"
@@ -12,15 +12,15 @@ namespace {
 
 constexpr std::uint32_t kMark = 0xD1A5'701E;
 constexpr std::size_t kWords = 7;
-static_assert(4 * kWords <= kHandOverBytes);
+static_assert(4 * kWords <= kHandOverBytes - 4);
 using Words = std::array<std::uint32_t, kWords>;
 
 volatile std::uint32_t* retained() { return reinterpret_cast<volatile std::uint32_t*>(kRetainedAddress); }
 
-std::uint32_t crc_of(Words words) {
+/// Over the words with a zero in the CRC's place, which is left in it.
+std::uint32_t crc_of(Words& words) {
   words.back() = 0;
-  const auto bytes = std::bit_cast<std::array<std::uint8_t, 4 * kWords>>(words);
-  return wire::crc32(bytes);
+  return wire::crc32({reinterpret_cast<const std::uint8_t*>(words.data()), sizeof words});
 }
 
 }  // namespace
@@ -29,7 +29,8 @@ std::optional<HandOver> read_hand_over() {
   Words words{};
   for (std::size_t i = 0; i < kWords; ++i)
     words[i] = retained()[i];
-  if (words[0] != kMark || words.back() != crc_of(words)) return {};
+  const std::uint32_t crc = words.back();
+  if (words[0] != kMark || crc != crc_of(words)) return {};
   return HandOver{static_cast<HandOverCommand>(words[1]), words[2], words[3],
                   static_cast<wire::ResetCause>(words[4]), words[5]};
 }

@@ -11,8 +11,8 @@
 //
 //   RAM     0x2000'0000  124 KB  data and stack; the first byte shows the latched fault
 //           0x2001'F000    4 KB  retained: no start-up code writes here, so it outlives a reset, though not
-//                                a loss of power; 64 bytes of hand-over (hand_over.hpp), then section
-//                                .retained for the application
+//                                a loss of power; 64 bytes of hand-over (hand_over.hpp), the last word of them the
+//                                bootloader's own, then section .retained for the application
 
 #include <array>
 #include <cstddef>

@@ -1,6 +1,7 @@
 #pragma once
 // An emulated board that left the factory, and `diastole flash` in its virtual time.
 
+#include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -63,6 +64,12 @@ class FlashBench {
     return version + (report->standing == wire::ImageState::confirmed ? " confirmed" : " unconfirmed");
   }
   [[nodiscard]] SimBoard& board() { return desk.controller.board(); }
+  /// A board that takes anybody's firmware: starts judge no signature. It must be off.
+  void remove_key() {
+    std::array<uint8_t, 32> erased{};
+    erased.fill(0xff);
+    board().load(erased, 0x0800'3FE0);
+  }
   void power_cycle() {
     board().power_cycle();
     desk.to_host.clear();

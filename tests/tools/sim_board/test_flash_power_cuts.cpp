@@ -6,6 +6,7 @@
 
 #include <random>
 #include <set>
+#include <utility>
 
 #include "tests/tools/sim_board/flash_bench.hpp"
 #include "tests/tools/sim_board/flash_history.hpp"
@@ -96,7 +97,7 @@ TEST(FlashPowerCuts, LeaveABoardThatStartsAndCanBeUpdated) {
       operations, score.tried, score.tried - score.lost, score.lost, second.tried, second.lost);
 }
 
-/// Cells that the cut left between zero and one read anew at each start: among the first and last operations, which are the
+/// Cells that the cut left between zero and one read anew at each reset: among the first and last operations, which are the
 /// bootloader's records and the erase, and in the image.
 TEST(FlashPowerCuts, LeaveABoardThatStartsWhateverItsCellsRead) {
   NEEDS_UPDATE_IMAGES();
@@ -130,6 +131,69 @@ TEST(FlashPowerCuts, LeaveABoardThatStartsWhateverItsCellsRead) {
   }
   EXPECT_GT(marginal, 0U);
   EXPECT_EQ(score.lost, 0U);
+}
+
+/// Words that a cut has hit and that read as they should by chance while the update goes on: the last of signature, header and code.
+TEST(FlashPowerCuts, WhatACutMayHaveHitIsWrittenAgain) {
+  NEEDS_UPDATE_IMAGES();
+  constexpr uint32_t slot_a = 0x0802'0000;
+  FlashBench bench(built + "bin/bootloader-stm32f405.bin");
+  SimBoard& board = bench.board();
+  const UpdateFile file = read_update_file(first_update);
+  board.cut_power_at_flash_operation(1'500);
+  EXPECT_THROW((void)bench.flash(file), HardwareError);
+  board.cut_power_at_flash_operation({});
+  bench.power_cycle();
+  const auto make_marginal = [&](size_t offset) {
+    const uint32_t address = slot_a + static_cast<uint32_t>(offset);
+    const uint32_t word = board.word(address).value();
+    board.make_marginal(address, ~word & (word + 1));  // the lowest bit that has fallen
+  };
+  bool begun = false;
+  const UpdateResult result = bench.flash(
+      file, {.say = [&](const std::string&) {
+        if (std::exchange(begun, true)) return;  // it waits in its bootloader
+        const auto slot = board.flash().subspan(0x2'0000, 0x2'0000);
+        size_t torn = slot.size();
+        while (slot[torn - 1] == 0xff)
+          --torn;
+        torn = (torn - 1) / 4 * 4;
+        board.load(std::span(file.images[0].code).subspan(torn - wire::kImageHeaderArea, 4),
+                   slot_a + static_cast<uint32_t>(torn));
+        for (const size_t offset : {wire::kSignedHeaderBytes - 4, wire::kImageHeaderBytes - 4, torn})
+          make_marginal(offset);
+      }});
+  EXPECT_TRUE(result.verified);
+  EXPECT_LT(result.sent_bytes, result.image_bytes) << "it went on";
+  EXPECT_EQ(board.marginal_words(), 0U);
+  EXPECT_EQ(bench.runs(), "0.1.0 confirmed");
+}
+
+/// One bit of the confirmed image that each reset reads anew, also the one between the bootloader's judgement and its jump.
+TEST(FlashPowerCuts, NoImageIsEnteredThatReadsOtherwiseThanItWasJudged) {
+  NEEDS_UPDATE_IMAGES();
+  constexpr uint32_t vector_table = 0xE000'ED08, slot_a = 0x0802'0000, slot_b = 0x0804'0000;
+  constexpr int starts = 16;
+  FlashBench bench;
+  ASSERT_EQ(bench.flash(newer_update).end, UpdateEnd::confirmed);  // into slot B; slot A still holds 0.1.0
+  bench.board().power_off();
+  bench.remove_key();
+  bench.board().make_marginal(slot_b + 0x1000, 1);
+  int entered_b = 0, judged_again = 0;
+  for (int start = 0; start < starts; ++start) {
+    const size_t resets = bench.board().statistics().resets.size();
+    bench.power_cycle();
+    bench.desk.sleep_until_ns(bench.desk.now_ns() + 150 * ms, nullptr);
+    const uint32_t vectors = bench.board().peripheral_word(vector_table);
+    ASSERT_GE(vectors, slot_a) << "the bootloader has entered nothing";
+    const bool in_b = vectors >= slot_b;
+    EXPECT_TRUE(verifies(bench.board().flash(), in_b ? wire::ImageSlot::b : wire::ImageSlot::a)) << start;
+    entered_b += in_b ? 1 : 0;
+    judged_again += bench.board().statistics().resets.size() > resets + 2 ? 1 : 0;
+  }
+  EXPECT_GT(judged_again, 0) << "it never changed between judgement and jump";
+  EXPECT_GT(entered_b, 0);
+  EXPECT_LT(entered_b, starts - judged_again) << "it never read wrong at once";
 }
 
 // The reconstruction of a cut is the emulator's own.

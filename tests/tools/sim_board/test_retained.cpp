@@ -82,7 +82,7 @@ TEST_F(Retained, SettingsOutliveAPowerCycle) {
   EXPECT_EQ(client->settings().backlash_microsteps, 40U);
 }
 
-/// Every operation, and every third with cells that keep an arbitrary part of their bits and read anew at each start.
+/// Every operation, and every third with cells that keep an arbitrary part of their bits and read anew at each reset.
 TEST_F(Retained, NoPowerCutWhileTheyAreWrittenLosesThem) {
   for (const std::optional<uint32_t> cell_seed : {std::optional<uint32_t>(), std::optional(2026U)}) {
     SCOPED_TRACE(cell_seed.value_or(0));

@@ -6,10 +6,10 @@
 // cut hits is left half done: a word keeps every second bit that should have fallen, an erase clears the
 // first half.
 //
-// Cells that were written below 2.7 V (32 bits at a time need that much), and with randomise_cut_cells() those of an operation that
-// the power cut hit, are marginal: each power-up reads them anew, a one or a zero, until the sector is erased or the word
-// written as it should be. With randomise_cut_cells() an arbitrary part of a word's bits has fallen, and an erase may leave its
-// sector reading blank. Option bytes (OPTCR) are kept as flash is, and count from the next reset on.
+// Cells that were written below 2.7 V (32 bits at a time need that much), with randomise_cut_cells() those of an operation that
+// the power cut hit, and those of make_marginal() are marginal: each reset reads them anew, a one or a zero, until the sector is
+// erased or the word written as it should be. With randomise_cut_cells() an arbitrary part of a word's bits has fallen, and an
+// erase may leave its sector reading blank. Option bytes (OPTCR) are kept as flash is, and count from the next reset on.
 
 #include <algorithm>
 #include <cstdint>
@@ -128,7 +128,7 @@ class Flash final : public RegisterBlock {
     randomised_ = true;
     random_.seed(seed);
   }
-  /// Power-up: marginal cells read anew.
+  /// A reset: marginal cells read anew.
   void read_marginal_cells() {
     for (const auto& [offset, bits] : marginal_) {
       uint32_t word = 0;
@@ -139,6 +139,8 @@ class Flash final : public RegisterBlock {
       changed(offset, 4);
     }
   }
+  /// These bits of the word at `offset`, a multiple of 4, are marginal from now on, as cells that wear out.
+  void make_marginal(uint32_t offset, uint32_t bits) { marginal_[offset] |= bits; }
   [[nodiscard]] uint64_t broken_off() const { return broken_off_; }
   [[nodiscard]] std::size_t marginal_words() const { return marginal_.size(); }
   /// A supply that falls below the first is held in reset until it has risen to the second.
@@ -253,6 +255,8 @@ class Flash final : public RegisterBlock {
   void keep_before(uint32_t first, uint32_t bytes) {
     before_at_ = first;
     before_.assign(memory_.begin() + first, memory_.begin() + first + bytes);
+    const auto weak = marginal_.find(first);
+    marginal_before_ = weak == marginal_.end() ? 0 : weak->second;
   }
   static uint32_t word_of(const uint8_t* place, uint32_t bytes) {
     uint32_t word = 0;
@@ -275,7 +279,8 @@ class Flash final : public RegisterBlock {
       const uint32_t left =
           old & ~(falling & (randomised_ ? static_cast<uint32_t>(random_()) : 0x5555'5555U));
       std::memcpy(&memory_[before_at_], &left, bytes);
-      if (randomised_) marginal_[before_at_] |= falling;
+      const uint32_t weak = marginal_before_ | (randomised_ ? falling : 0);
+      if (weak != 0) make_marginal(before_at_, weak);
     } else {
       const uint32_t done = randomised_ && random_() % 2 == 0 ? bytes : bytes / 2;
       std::copy(before_.begin() + done, before_.end(), memory_.begin() + before_at_ + done);
@@ -323,7 +328,8 @@ class Flash final : public RegisterBlock {
   Cycles busy_until_ = 0;
   uint64_t operations_ = 0, broken_off_ = 0;
   uint32_t before_at_ = 0;
-  std::vector<uint8_t> before_;  ///< what the last operation found
+  std::vector<uint8_t> before_;   ///< what the last operation found
+  uint32_t marginal_before_ = 0;  ///< ... of its first word
   std::optional<uint64_t> cut_at_;
 };
 

@@ -1,6 +1,10 @@
 // The bootloader on the STM32F405. A start takes two passes: the first decides and leaves the slot in the
 // hand-over, then resets; the second enters the slot before it has touched any peripheral, so that the
-// application begins as if it had been started by the chip itself.
+// application begins as if it had been started by the chip itself. A slot that does not read any more as it
+// did when it was judged is not entered: the second pass decides anew.
+
+#include <algorithm>
+#include <bit>
 
 #include "firmware/boards/stm32f405/bootloader/boot_board.hpp"
 #include "firmware/boards/stm32f405/hand_over.hpp"
@@ -19,6 +23,22 @@ asm(".section .signing_key,\"a\",%progbits\n"
 
 BootBoard board;
 boot::Bootloader<BootBoard> bootloader(board);
+
+/// What the first pass has read in the slot that it chose; the last word of the hand-over's memory is this.
+volatile std::uint32_t& judged_reading() {
+  return *reinterpret_cast<volatile std::uint32_t*>(kRetainedAddress + kHandOverBytes - 4);
+}
+
+/// A sum over a slot's header and code that any one changed bit changes: against cells that read now so, now so, not against
+/// malice, for which the signature is.
+std::uint32_t reading_of(std::uint32_t slot) {
+  const std::span<const std::uint32_t> words = words_of(kSlotSectors[slot]);
+  const std::size_t image_words = (wire::kImageHeaderArea + words[wire::kCodeBytesAt / 4]) / 4;
+  std::uint32_t sum = 0;
+  for (const std::uint32_t word : words.first(std::min(image_words, words.size())))
+    sum = std::rotl(sum, 1) + word;
+  return sum;
+}
 
 /// Loads the stack pointer and the program counter from the application's vector table.
 [[gnu::naked, noreturn]] void jump(std::uint32_t /*vectors*/) {
@@ -54,7 +74,7 @@ int main() {
   hand_over.command = HandOverCommand::none;
   if (command == HandOverCommand::start && hand_over.slot < kSlotSectors.size()) {
     write_hand_over(hand_over);
-    enter(hand_over.slot);
+    if (reading_of(hand_over.slot) == judged_reading()) enter(hand_over.slot);
   }
   ++hand_over.starts;
   write_hand_over(hand_over);
@@ -65,6 +85,7 @@ int main() {
     hand_over.command = HandOverCommand::start;
     hand_over.slot = static_cast<std::uint32_t>(start.slot);
     hand_over.trial = start.trial ? 1 : 0;
+    judged_reading() = reading_of(hand_over.slot);
   }
   write_hand_over(hand_over);
   reset();
