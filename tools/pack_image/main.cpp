@@ -146,9 +146,8 @@ void write_public_key(const std::string& key, const std::string& out, bool make)
         missing && make ? signing::make_key_file(key) : signing::read_key_file(key);
     if (missing)
       std::printf(
-          "A key to sign firmware with was made: %s. Keep a copy outside of the build folder, and build with "
-          "it "
-          "(-DDIASTOLE_SIGNING_KEY=FILE): a controller takes firmware of this key only.\n",
+          "A key to sign firmware with was made: %s. Keep a copy: a controller takes firmware of this key "
+          "only.\n",
           key.c_str());
     const signing::PublicKey open = signing::public_key_of(secret);
     bytes.assign(open.begin(), open.end());

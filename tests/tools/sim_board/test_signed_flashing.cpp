@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <fstream>
+
 #include "protocol/signing/signing_key.hpp"
 #include "tests/tools/sim_board/flash_bench.hpp"
 
@@ -10,12 +12,19 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr uint32_t key_address = 0x0800'3FE0;
-const std::string key_file = built + "signing-key.pem";
+/// Of the key file that the firmware was built with; there is none if it was built without.
+const std::string key_file = [] {
+  std::ifstream file(built + "signing-key.path");
+  std::string path;
+  std::getline(file, path);
+  return path;
+}();
 
-#define NEEDS_KEY()      \
-  NEEDS_UPDATE_IMAGES(); \
-  if (!std::filesystem::exists(key_file)) GTEST_SKIP() << "the firmware was not built with a key of its own"
+#define NEEDS_KEY()                                                \
+  NEEDS_UPDATE_IMAGES();                                           \
+  if (!std::filesystem::exists(key_file))                          \
+  GTEST_SKIP() << "the firmware was not built with a key that is " \
+                  "here"
 
 UpdateFile signed_with(UpdateFile file, const signing::SecretKey& key, uint32_t counter) {
   for (SlotImage& image : file.images)

@@ -1,0 +1,55 @@
+# Who may sign firmware: a board takes firmware of the key that its bootloader was built with, and of no other. So the key that the
+# first build makes lies with the person who builds, for every later build and clone, and not in a folder that is removed now and then.
+set(DIASTOLE_SIGNING_KEY "" CACHE STRING "Ed25519 key that signs the firmware (diastole flash --new-key), or none")
+
+# diastole_signing_key(OUT)  — the key's file, which may have to be made yet, or `none`; prints which
+function(diastole_signing_key out)
+  set(key "${DIASTOLE_SIGNING_KEY}")
+  if("${key}" STREQUAL "none")
+    message(WARNING "DIASTOLE_SIGNING_KEY=none: the controller will take firmware from anybody who reaches its serial line")
+  else()
+    if("${key}" STREQUAL "")
+      diastole_own_signing_key(key)
+    elseif(NOT IS_ABSOLUTE "${key}")
+      message(FATAL_ERROR "DIASTOLE_SIGNING_KEY=${key}: give the key file's whole path (or none)")
+    endif()
+    message(STATUS "Firmware is signed with the key ${key}")
+  endif()
+  set(${out} "${key}" PARENT_SCOPE)
+endfunction()
+
+# In $XDG_CONFIG_HOME or ~/.config; in the build folder, and said so, where there is no such folder and none can be made. If there
+# is no key yet, one that an earlier build made in its own folder is copied.
+function(diastole_own_signing_key out)
+  set(in_build "${CMAKE_BINARY_DIR}/signing-key.pem")
+  set(folder "$ENV{XDG_CONFIG_HOME}")
+  if(NOT IS_ABSOLUTE "${folder}" AND IS_ABSOLUTE "$ENV{HOME}")
+    set(folder "$ENV{HOME}/.config")
+  endif()
+  set(key "${folder}/diastole/signing-key.pem")
+  set(found TRUE)
+  if(NOT IS_ABSOLUTE "${folder}")
+    set(found FALSE)
+  elseif(NOT EXISTS "${key}")
+    execute_process(COMMAND sh -c "umask 077 && mkdir -p \"$1\" && test -w \"$1\"" sh "${folder}/diastole"
+      RESULT_VARIABLE failed OUTPUT_QUIET ERROR_QUIET)
+    if(failed)
+      set(found FALSE)
+    elseif(EXISTS "${in_build}")
+      file(COPY "${in_build}" DESTINATION "${folder}/diastole" FILE_PERMISSIONS OWNER_READ OWNER_WRITE)
+    endif()
+  endif()
+  if(NOT found)
+    message(STATUS "No folder of yours was found to keep a key in (XDG_CONFIG_HOME, HOME): it is lost with the build folder, and boards "
+      "that were flashed take no later firmware. Keep a copy, and give -DDIASTOLE_SIGNING_KEY=FILE")
+    set(key "${in_build}")
+  elseif(EXISTS "${in_build}")
+    file(SHA256 "${in_build}" former)
+    file(SHA256 "${key}" present)
+    if(NOT former STREQUAL present)
+      message(WARNING "Earlier builds in this folder signed with another key, ${in_build}: boards that were flashed with them take "
+        "firmware of that key only (-DDIASTOLE_SIGNING_KEY=${in_build})")
+    endif()
+  endif()
+  set(${out} "${key}" PARENT_SCOPE)
+endfunction()
