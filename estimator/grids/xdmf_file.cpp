@@ -4,6 +4,8 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <map>
 #include <pugixml.hpp>
 #include <sstream>
 #include <stdexcept>
@@ -80,7 +82,7 @@ class XdmfReader {
   std::vector<double> dataset(const std::string& name, const std::string& path, const std::string& place) {
     const std::filesystem::path beside = std::filesystem::path(file_).parent_path() / name;
     try {
-      return runfile::H5Source(beside).field(path);
+      return beside_.try_emplace(beside.lexically_normal(), beside).first->second.field(path);
     } catch (const InputError& error) {
       const InputFault& fault = error.fault();
       refuse(place, fmt::format("{}{}: {}", fault.file, fault.place.empty() ? "" : ", " + fault.place,
@@ -159,6 +161,7 @@ class XdmfReader {
 
   std::string file_;
   pugi::xml_document document_;
+  std::map<std::filesystem::path, runfile::H5Source> beside_;  ///< each bounds what is read of it in all
 };
 
 /// The XML and the datasets that it names.

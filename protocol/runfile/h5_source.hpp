@@ -4,7 +4,7 @@
 //
 // A file may come from anywhere. What it claims is held against what it has before memory is taken: no link leads out of it, no
 // dataset's values lie in another file, no dataset has more rows than its bytes can hold or a packed chunk of more bytes than are
-// unpacked at a time, and no plug-in is loaded to read it.
+// unpacked at a time, all that is read together is no more than a recording of its size may be, and no plug-in is loaded to read it.
 //
 // Errors: every member throws InputError naming the file and the object that is missing or of the wrong kind.
 
@@ -74,12 +74,16 @@ class H5Source {
   /// A one-dimensional dataset of numbers: of triggers, phases, points; no samples.
   [[nodiscard]] std::vector<double> numbers(const std::string& path) const {
     const DatasetHandle dataset = open_dataset(path);
-    return read_numbers(dataset, path, length(dataset, path, most_rows));
+    const size_t rows = length(dataset, path, most_rows);
+    charge("dataset " + path, rows * bytes_per_value);
+    return read_numbers(dataset, path, rows);
   }
   /// A recording's samples, all of them in memory.
   [[nodiscard]] std::vector<double> samples(const std::string& path) const {
     const DatasetHandle dataset = open_dataset(path);
-    return read_numbers(dataset, path, length(dataset, path, most_samples));
+    const size_t rows = length(dataset, path, most_samples);
+    charge("dataset " + path, rows * sizeof(double));
+    return read_numbers(dataset, path, rows);
   }
   /// All numbers of a dataset of any shape, the last index running fastest.
   [[nodiscard]] std::vector<double> field(const std::string& path) const {
@@ -88,12 +92,15 @@ class H5Source {
     const hssize_t count = H5Sget_simple_extent_npoints(space.get());
     if (count < 0 || static_cast<hsize_t>(count) > most_samples)
       fail("dataset " + path, fmt::format("claims {} numbers", count));
+    charge("dataset " + path, static_cast<uint64_t>(count) * sizeof(double));
     return read_numbers(dataset, path, static_cast<size_t>(count));
   }
   /// The same, read when it is asked for; stays readable without this object.
   [[nodiscard]] Series series(const std::string& path) const {
     const auto dataset = std::make_shared<const DatasetHandle>(open_in_chunks(path));
     if (!is_number(TypeHandle(H5Dget_type(dataset->get())))) fail("dataset " + path, "does not hold numbers");
+    const size_t rows = length(*dataset, path, most_samples);
+    charge("dataset " + path, rows * sizeof(double));
     const auto read = [dataset, path, name = name_](size_t first, std::span<double> values) {
       const hsize_t from = first, count = values.size();
       const SpaceHandle stored(H5Dget_space(dataset->get()));
@@ -104,13 +111,14 @@ class H5Source {
         throw InputError({name, "dataset " + path, "cannot be read; the file is damaged", ""});
       }
     };
-    return {length(*dataset, path, most_samples), read};
+    return {rows, read};
   }
   /// A dataset that holds one number, or one text.
   [[nodiscard]] double scalar(const std::string& path) const {
     const DatasetHandle dataset = open_dataset(path);
     const SpaceHandle space(H5Dget_space(dataset.get()));
     double value = 0;
+    charge("dataset " + path, bytes_per_value);
     if (!is_number(TypeHandle(H5Dget_type(dataset.get()))) ||
         H5Sget_simple_extent_npoints(space.get()) != 1 ||
         H5Dread(dataset.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, &value) < 0) {
@@ -125,9 +133,9 @@ class H5Source {
     if (H5Tget_class(type.get()) != H5T_STRING || H5Sget_simple_extent_npoints(space.get()) != 1) {
       fail("dataset " + path, "does not hold one text");
     }
-    const auto texts = read_texts(type, space, 1, unwrapped, [&](hid_t memory, void* target) {
-      return read_with_texts(dataset, memory, target, path);
-    });
+    const auto texts = read_texts(
+        "dataset " + path, type, space, 1, unwrapped,
+        [&](hid_t memory, void* target) { return read_with_texts(dataset, memory, target, path); });
     if (!texts) fail("dataset " + path, "cannot be read; the file is damaged");
     return texts->front();
   }
@@ -140,14 +148,10 @@ class H5Source {
     std::vector<std::string> names;
     H5Aiterate2(handle.get(), H5_INDEX_NAME, H5_ITER_INC, nullptr, collect_attribute, &names);
     std::map<std::string, Attribute, std::less<>> values;
-    uint64_t text_bytes = 0;
     for (const std::string& name : names) {
-      const auto value = read_attribute(AttributeHandle(H5Aopen(handle.get(), name.c_str(), H5P_DEFAULT)));
-      if (!value) continue;
-      if (const auto* text = std::get_if<std::string>(&*value)) text_bytes += text->size();
-      if (text_bytes > bytes_)
-        fail("group " + object, "has attributes with more text than the file has bytes", tampered);
-      values.emplace(name, *value);
+      charge("group " + object, bytes_per_value + name.size());
+      const AttributeHandle attribute(H5Aopen(handle.get(), name.c_str(), H5P_DEFAULT));
+      if (auto value = read_attribute("group " + object, attribute)) values.emplace(name, std::move(*value));
     }
     return values;
   }
@@ -171,9 +175,9 @@ class H5Source {
       return row;
     };
     const SpaceHandle space(H5Dget_space(opened.table.get()));
-    auto texts = read_texts(opened.type, space, opened.rows, one_member, [&](hid_t memory, void* target) {
-      return read_with_texts(opened.table, memory, target, table);
-    });
+    auto texts = read_texts(
+        "dataset " + table, opened.type, space, opened.rows, one_member,
+        [&](hid_t memory, void* target) { return read_with_texts(opened.table, memory, target, table); });
     if (!texts) fail("dataset " + table, "cannot be read; the file is damaged");
     out = std::move(*texts);
   }
@@ -189,7 +193,11 @@ class H5Source {
   static constexpr hsize_t most_samples = hsize_t{1} << 27, most_rows = hsize_t{1} << 24;
   /// The library's own choice is a megabyte at most, the daemon's 32 KB.
   static constexpr uint64_t most_chunk_bytes = uint64_t{16} << 20;
-  static constexpr size_t most_text_bytes = size_t{1} << 28;
+  /// All that is read has so many times the bytes of its file, or of a megabyte, at most: evenly spaced times are packed ten times,
+  /// and the eleven columns beside them, of ten channels of which one is filtered, take no room in the file while they stand still.
+  static constexpr uint64_t most_expansion = 128, small_file_bytes = uint64_t{1} << 20;
+  /// Of a trigger, a phase, an attribute, a cell of a table: with the remarks that are made about it.
+  static constexpr uint64_t bytes_per_value = 128;
   /// Deflate makes 1032 bytes of one at best (zlib's technical notes), and a chunk of a few bytes has its ends besides.
   static constexpr uint64_t most_inflation = 1100;
   static constexpr const char* tampered =
@@ -204,27 +212,45 @@ class H5Source {
     return text;
   }
 
+  /// To be called before memory is taken. A dataset may have any number of links, and a few packed bytes are many zeros: it is the
+  /// sum of all reads that must stay within bounds.
+  void charge(const std::string& place, uint64_t bytes) const {
+    constexpr double MB = 1e6;
+    const uint64_t most = most_expansion * std::max(bytes_, small_file_bytes);
+    if (bytes > most - charged_bytes_)
+      fail(place,
+           fmt::format("needs {:.1f} MB of memory with what was read before it, and a file of {:.1f} MB may "
+                       "have {:.1f} MB",
+                       static_cast<double>(charged_bytes_ + bytes) / MB, static_cast<double>(bytes_) / MB,
+                       static_cast<double>(most) / MB),
+           tampered);
+    charged_bytes_ += bytes;
+  }
+
   /// Reads `count` texts whose stored type is `stored`; `wrap` turns the text type into the type to read with
   /// (itself, or a compound with that one member).
-  static std::optional<std::vector<std::string>> read_texts(const TypeHandle& stored,
-                                                            const SpaceHandle& space, size_t count,
-                                                            const std::function<TypeHandle(hid_t)>& wrap,
-                                                            const ReadInto& read) {
+  [[nodiscard]] std::optional<std::vector<std::string>> read_texts(
+      const std::string& place, const TypeHandle& stored, const SpaceHandle& space, size_t count,
+      const std::function<TypeHandle(hid_t)>& wrap, const ReadInto& read) const {
     std::vector<std::string> texts;
     const TypeHandle memory(H5Tcopy(H5T_C_S1));
     H5Tset_cset(memory.get(), H5Tget_cset(stored.get()));
     if (H5Tis_variable_str(stored.get()) > 0) {
+      charge(place, count * bytes_per_value);
       H5Tset_size(memory.get(), H5T_VARIABLE);
       std::vector<char*> pointers(count, nullptr);
       const TypeHandle type = wrap(memory.get());
       if (!read(type.get(), pointers.data())) return std::nullopt;
+      uint64_t text_bytes = 0;
       for (const char* pointer : pointers)
-        texts.emplace_back(pointer == nullptr ? "" : pointer);
+        text_bytes += texts.emplace_back(pointer == nullptr ? "" : pointer).size();
       H5Dvlen_reclaim(type.get(), space.get(), H5P_DEFAULT, pointers.data());
+      charge(place, text_bytes);
       return texts;
     }
     const size_t size = H5Tget_size(stored.get());
-    if (size == 0 || count > most_text_bytes / size) return std::nullopt;
+    if (size == 0) return std::nullopt;
+    charge(place, count * (bytes_per_value + size));
     H5Tset_size(memory.get(), size);
     H5Tset_strpad(memory.get(), H5Tget_strpad(stored.get()));
     std::vector<char> bytes(count * size);
@@ -242,7 +268,8 @@ class H5Source {
     return kind == H5T_FLOAT || kind == H5T_INTEGER;
   }
 
-  [[nodiscard]] std::optional<Attribute> read_attribute(const AttributeHandle& attribute) const {
+  [[nodiscard]] std::optional<Attribute> read_attribute(const std::string& place,
+                                                        const AttributeHandle& attribute) const {
     const TypeHandle type(H5Aget_type(attribute.get()));
     const SpaceHandle space(H5Aget_space(attribute.get()));
     if (H5Sget_simple_extent_npoints(space.get()) != 1 || H5Tget_size(type.get()) > bytes_)
@@ -260,8 +287,8 @@ class H5Source {
         return read(H5T_NATIVE_DOUBLE, &value) ? std::optional<Attribute>(value) : std::nullopt;
       }
       case H5T_STRING: {
-        const auto texts = read_texts(type, space, 1, unwrapped, read);
-        return texts ? std::optional<Attribute>(texts->front()) : std::nullopt;
+        auto texts = read_texts(place, type, space, 1, unwrapped, read);
+        return texts ? std::optional<Attribute>(std::move(texts->front())) : std::nullopt;
       }
       default:
         return std::nullopt;
@@ -402,7 +429,9 @@ class H5Source {
     constexpr size_t slots = 13;  // a prime, as the library asks
     const PropertyHandle access(H5Pcreate(H5P_DATASET_ACCESS));
     dataset = DatasetHandle();  // one that is open would keep its cache
-    H5Pset_chunk_cache(access.get(), slots, 2 * static_cast<size_t>(rows) * H5Tget_size(type.get()), 1);
+    const size_t cache_bytes = 2 * static_cast<size_t>(rows) * H5Tget_size(type.get());
+    charge("dataset " + path, cache_bytes);
+    H5Pset_chunk_cache(access.get(), slots, cache_bytes, 1);
     return DatasetHandle(H5Dopen2(file_.get(), path.c_str(), access.get()));
   }
   [[nodiscard]] size_t length(const DatasetHandle& dataset, const std::string& path, hsize_t most) const {
@@ -444,6 +473,7 @@ class H5Source {
     const Column opened = open_column(table, column);
     if (!is_number(opened.type))
       fail("dataset " + table, fmt::format("column {} does not hold numbers", column));
+    charge("dataset " + table, opened.rows * bytes_per_value);
     std::vector<Number> values(opened.rows);
     if (values.empty()) return values;
     const TypeHandle row(H5Tcreate(H5T_COMPOUND, sizeof(Number)));
@@ -457,7 +487,8 @@ class H5Source {
 
   std::string name_;
   FileHandle file_;
-  uint64_t bytes_ = 0;  ///< of the file
+  uint64_t bytes_ = 0;                  ///< of the file
+  mutable uint64_t charged_bytes_ = 0;  ///< of all that was read of it
 };
 
 }  // namespace diastole::runfile

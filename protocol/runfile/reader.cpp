@@ -77,6 +77,9 @@ std::optional<StreamGrid> read_grid(const H5Source& source, const std::string& g
   return StreamGrid{*start_s, *end_s, *rate_Hz};
 }
 
+/// Each is open as long as the run is, with the library's index of it. A Modbus module has fewer inputs.
+constexpr size_t most_channels = 256;
+
 /// Without rows.
 PressureTrace read_channels(const H5Source& source) {
   PressureTrace pressure;
@@ -85,6 +88,10 @@ PressureTrace read_channels(const H5Source& source) {
     if (unit_of(name) != pressure_unit) continue;
     const std::string dataset = fmt::format("{}/{}", pressure_group, name);
     pressure.channels[name];
+    if (pressure.channels.size() > most_channels)
+      source.fail(fmt::format("group {}", pressure_group),
+                  fmt::format("has more than {} channels", most_channels),
+                  "No instrument has as many: the file was damaged or made to do harm.");
     auto notes = source.attributes(dataset);
     if (const auto units = notes.find("units"); units != notes.end()) {
       const auto* stated = std::get_if<std::string>(&units->second);
@@ -102,34 +109,41 @@ PressureTrace read_channels(const H5Source& source) {
   return pressure;
 }
 
-/// The number that a group of a segment is named by.
-size_t segment_of(const H5Source& source, const std::string& group, const std::string& name) {
+/// The number that a group of one of `segments` segments is named by.
+size_t segment_of(const H5Source& source, const std::string& group, const std::string& name,
+                  size_t segments) {
   size_t segment = 0;
   const char* end = name.data() + name.size();
-  if (std::from_chars(name.data(), end, segment).ptr != end) {
+  if (const auto [read, error] = std::from_chars(name.data(), end, segment);
+      read != end || error != std::errc()) {
     source.fail(fmt::format("group {}/{}", group, name), "is not named by a segment's number");
+  }
+  if (segment >= segments) {
+    source.fail(fmt::format("group {}/{}", group, name),
+                fmt::format("is of a segment that {} has not: it has {}", segments_table.path, segments),
+                "Segments count from 0.");
   }
   return segment;
 }
 
-std::map<size_t, PlayedWaveform> read_waveforms(const H5Source& source) {
+std::map<size_t, PlayedWaveform> read_waveforms(const H5Source& source, size_t segments) {
   std::map<size_t, PlayedWaveform> waveforms;
   for (const std::string& name : source.children(waveforms_group)) {
     const std::string group = fmt::format("{}/{}", waveforms_group, name);
-    waveforms[segment_of(source, waveforms_group, name)] = {source.text(group + "/points"),
-                                                            source.numbers(group + "/phase"),
-                                                            source.numbers(group + "/fraction")};
+    waveforms[segment_of(source, waveforms_group, name, segments)] = {source.text(group + "/points"),
+                                                                      source.numbers(group + "/phase"),
+                                                                      source.numbers(group + "/fraction")};
   }
   return waveforms;
 }
 
-std::map<size_t, FlowVolume> read_flow(const H5Source& source) {
+std::map<size_t, FlowVolume> read_flow(const H5Source& source, size_t segments) {
   std::map<size_t, FlowVolume> flow;
   for (const std::string& name : source.children(flow_group)) {
     const std::string group = fmt::format("{}/{}", flow_group, name);
-    flow[segment_of(source, flow_group, name)] = {source.numbers(group + "/phase_s"),
-                                                  source.numbers(group + "/cavity_mL"),
-                                                  source.numbers(group + "/sigma_mL")};
+    flow[segment_of(source, flow_group, name, segments)] = {source.numbers(group + "/phase_s"),
+                                                            source.numbers(group + "/cavity_mL"),
+                                                            source.numbers(group + "/sigma_mL")};
   }
   return flow;
 }
@@ -153,12 +167,12 @@ RecordedRun read_without_rows(const H5Source& source) {
   run.rig = source.attributes(rig_group);
   run.protocol_toml = source.text(protocol_toml);
   run.segments = read_table<Segment>(source, segments_table);
-  run.waveforms = read_waveforms(source);
+  run.waveforms = read_waveforms(source, run.segments.size());
   run.pump.grid = read_grid(source, pump_group);
   run.pressure = read_channels(source);
   run.trigger_s = source.numbers(trigger_time);
   if (source.has(trigger_delay)) run.trigger_delay_s = source.scalar(trigger_delay);
-  run.flow = read_flow(source);
+  run.flow = read_flow(source, run.segments.size());
   run.clock = read_clock(source);
   if (source.has(slices_table.path)) run.slices = read_table<Slice>(source, slices_table);
   run.gaps = read_table<Gap>(source, gaps_table);

@@ -18,6 +18,8 @@ import numpy as np
 MOST_MEMORY = 600 << 20  # of address space: program, libraries and what a run of seconds needs
 HUGE = 100_000_000
 MEGABYTE = "x" * (1 << 20)
+CHUNK_ROWS = 1 << 17
+IN_SUM = "MB of memory with what was read before it"
 
 
 def external_link(run, place):
@@ -139,6 +141,97 @@ def a_type_of_its_own(run, place):
     return "dataset /pump/commanded_mL"
 
 
+def of_zeros(group, name, rows, row="f8"):
+    """Many rows in few bytes: a kilobyte for each megabyte."""
+    data = group.create_dataset(name, (rows,), row, chunks=(CHUNK_ROWS,), compression="gzip")
+    chunk = zlib.compress(bytes(CHUNK_ROWS * data.dtype.itemsize))
+    for first in range(0, rows, CHUNK_ROWS):
+        data.id.write_direct_chunk((first,), chunk)
+    return data
+
+
+def one_dataset_as_every_flow(run, place):
+    rows = np.repeat(run["protocol/segments"][:], 1000)
+    kind = run["protocol/segments"].dtype
+    del run["protocol/segments"]
+    run.create_dataset("protocol/segments", data=rows, dtype=kind)
+    zeros = of_zeros(run, "zeros", CHUNK_ROWS)
+    for segment in range(1000):
+        for name in ("phase_s", "cavity_mL", "sigma_mL"):
+            run[f"mr/flow/{segment}/{name}"] = zeros
+    return IN_SUM
+
+
+def flow_of_no_segment(run, place):
+    for name in ("phase_s", "cavity_mL", "sigma_mL"):
+        run[f"mr/flow/1/{name}"] = np.arange(10.0)
+    return "group /mr/flow/1: is of a segment"
+
+
+def waveform_of_no_segment(run, place):
+    run["protocol/waveforms/1/points"] = "phase,fraction"
+    for name in ("phase", "fraction"):
+        run[f"protocol/waveforms/1/{name}"] = np.arange(10.0)
+    return "group /protocol/waveforms/1: is of a segment"
+
+
+def one_dataset_as_many_channels(run, place):
+    del run["pressure/cavity_kPa"]
+    zeros = of_zeros(run, "pressure/cavity_kPa", 1 << 22)
+    for i in range(100):
+        run[f"pressure/p{i}_kPa"] = zeros
+    return IN_SUM
+
+
+def more_channels_than_an_instrument_has(run, place):
+    for i in range(300):
+        run[f"pressure/p{i}_kPa"] = run["pressure/cavity_kPa"]
+    return "group /pressure: has more than 256 channels"
+
+
+def channels_of_large_chunks(run, place):
+    """Of each of which two would be kept."""
+    rows = 1 << 21
+    for name in list(run["pressure"]):
+        del run["pressure"][name]
+    run.create_dataset("pressure/time_s", data=np.arange(rows) / 1024, chunks=(CHUNK_ROWS,), compression="gzip", shuffle=True)
+    chunk = zlib.compress(bytes(8 * rows))
+    for name in ["cavity_kPa"] + [f"p{i}_kPa" for i in range(40)]:
+        data = run.create_dataset(f"pressure/{name}", (rows,), "f8", chunks=(rows,), compression="gzip")
+        data.id.write_direct_chunk((0,), chunk)
+    return IN_SUM
+
+
+def long_notes_on_every_channel(run, place):
+    cavity = run["pressure/cavity_kPa"]
+    cavity.attrs["first"], cavity.attrs["second"] = MEGABYTE, MEGABYTE
+    for i in range(250):
+        run[f"pressure/p{i}_kPa"] = cavity
+    return IN_SUM
+
+
+def of_many_rows(run, table):
+    kinds = run[table].dtype
+    row = np.dtype([(name, "S1" if kinds[name].kind in "OS" else kinds[name]) for name in kinds.names])
+    del run[table]
+    of_zeros(run, table, 1 << 24, row)
+    return f"dataset /{table}: needs"
+
+
+def events_that_unpack_to_many(run, place):
+    return of_many_rows(run, "events")
+
+
+def gaps_that_unpack_to_many(run, place):
+    return of_many_rows(run, "gaps")
+
+
+def triggers_that_unpack_to_many(run, place):
+    del run["trigger/time_s"]
+    run.create_dataset("trigger/time_s", data=np.arange(1 << 22) / (1 << 20), chunks=(CHUNK_ROWS,), compression="gzip", shuffle=True)
+    return "dataset /trigger/time_s: needs"
+
+
 def after(file, tampered):
     """What h5py itself cannot write, put into the finished file's bytes."""
     content = file.read_bytes()
@@ -162,7 +255,9 @@ def after(file, tampered):
 HOSTILE = [external_link, external_group, user_defined_link, damaged_group, external_storage, virtual_dataset, rows_that_are_not_there,
            chunks_that_are_not_there, one_chunk_that_unpacks_to_much, more_triggers_than_any_recording_has, table_that_is_not_there, one_text_many_times,
            one_waveform_many_times, text_of_a_fixed_length,
-           set_of_numbers_in_two_dimensions, a_type_of_its_own]
+           set_of_numbers_in_two_dimensions, a_type_of_its_own, one_dataset_as_every_flow, flow_of_no_segment, waveform_of_no_segment,
+           one_dataset_as_many_channels, more_channels_than_an_instrument_has, channels_of_large_chunks, long_notes_on_every_channel,
+           events_that_unpack_to_many, gaps_that_unpack_to_many, triggers_that_unpack_to_many]
 
 
 def limited():
@@ -190,7 +285,7 @@ def main():
             if not after(file, tampered):
                 failures.append(f"{tampered.__name__}: this test could not make it")
                 continue
-            for command in (["inspect", str(file)], ["note", str(file), "a word"]):
+            for command in (["inspect", str(file)], ["note", str(file), "a word"], ["catheter", str(file)]):
                 before = file.read_bytes()
                 ended = subprocess.run([diastole, *command], cwd=place, capture_output=True, text=True, preexec_fn=limited,
                                        timeout=60)

@@ -6,6 +6,7 @@
 #include "estimator/grids/gmsh_file.hpp"
 #include "estimator/grids/vtu_file.hpp"
 #include "estimator/grids/xdmf_file.hpp"
+#include "estimator/io/whole_file.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 
 namespace diastole {
@@ -151,6 +152,24 @@ TEST(Grids, XdmfThereAndBackToTheLastBit) {
   std::filesystem::remove(folder.path() / "a.h5");
   EXPECT_THAT(message_of([&] { (void)read_grid((folder.path() / "a.xdmf").string()); }),
               HasSubstr("a.h5: cannot be opened"));
+}
+
+TEST(Grids, XdmfRefusesADatasetThatIsNamedMoreOftenThanMemoryBears) {
+  const test::ScratchFolder folder;
+  FieldGrid grid = some_grid();
+  grid.points.resize(30'000);
+  grid.steps.resize(1);
+  grid.steps[0].point_data[0].values.resize(30'000);
+  const std::string file = (folder.path() / "a.xdmf").string(), end_of_field = "</Attribute>";
+  write_xdmf(file, grid);
+  std::string text = read_whole_file(file);
+  const size_t begin = text.find("<Attribute"), end = text.find(end_of_field) + end_of_field.size();
+  const std::string field = text.substr(begin, end - begin);
+  for (int i = 0; i < 600; ++i)  // 144 MB of 0.5 MB
+    text.insert(end, field);
+  (void)folder.write("a.xdmf", text);
+  EXPECT_THAT(message_of([&] { (void)read_grid(file); }),
+              HasSubstr("a.h5, dataset /step0/displacement_mm: needs"));
 }
 
 std::string vtu_with(const std::string& attributes, const std::string& points,
