@@ -1,4 +1,4 @@
-// A session of slices whose daemon is killed again and again, and that a person's command takes up each time.
+// A session of slices whose daemon is killed again and again; each time run.start takes it up, as `diastole run --resume` asks it to.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "protocol/contract/input_error.hpp"
+#include "protocol/runfile/layout.hpp"
 #include "protocol/runfile/reader.hpp"
 #include "tests/faults/fault_table.hpp"
 #include "tests/flow/rig_with_daemon.hpp"
@@ -22,9 +23,10 @@ using namespace std::chrono_literals;
 using flow::RigWithDaemon;
 using nlohmann::json;
 
-constexpr double period_s = 0.3;
+constexpr double period_s = 0.3, sample_rate_Hz = 300;
 constexpr int64_t slices = 40, cycles_per_slice = 2;
 constexpr int kills_per_session = 14;
+constexpr double most_lost_s = 1;  // by a kill
 
 const std::string study = fmt::format(
     "format = \"diastole-experiment\"\nversion = 1\nrest_s = 0.2\n[[segment]]\nwaveform = "
@@ -44,8 +46,10 @@ void make_ready(DaemonClient& client) {
   if (client.call("rig.status")["state"] != "homed") client.call("rig.home", json::object(), 300s);
 }
 
-/// True when the run came to its end; otherwise the daemon was killed when it had so many samples.
-bool run_or_kill(RigWithDaemon& rig, bool resume, uint64_t samples) {
+using SamplesOfRuns = std::map<std::string, uint64_t>;  ///< by run_id
+
+/// True when the run came to its end; otherwise the daemon was killed when it had so many samples. How many, `received` keeps.
+bool run_or_kill(RigWithDaemon& rig, bool resume, uint64_t samples, SamplesOfRuns& received) {
   rig.start_daemon();
   auto client = rig.client();
   make_ready(client);
@@ -56,19 +60,19 @@ bool run_or_kill(RigWithDaemon& rig, bool resume, uint64_t samples) {
     EXPECT_TRUE(std::string(error.what()).find("nothing left to do") != std::string::npos) << error.what();
     return true;  // the kill before came after the last slice
   }
-  for (json progress = client.call("run.progress"); progress["received"] < samples;
-       progress = client.call("run.progress"))
-    if (progress["state"] == "done") return true;
+  for (uint64_t now = 0; now < samples;) {
+    const json progress = client.call("run.progress");
+    now = received[progress["run_id"]] = progress["received"];
+    if (now < samples && progress["state"] == "done") return true;
+  }
   rig.daemon->signal(SIGKILL);
   rig.daemon->wait();
   rig.daemon.reset();
   return false;
 }
 
-/// Slices of a run file of which it holds everything until the end of their last cycle, and how many triggers it has.
-std::set<int64_t> whole_slices(const std::filesystem::path& file, size_t& triggers) {
-  const auto run = runfile::read_run(file);
-  triggers += run.trigger_s.size();
+/// Slices of a run of which it holds everything until the end of their last cycle.
+std::set<int64_t> whole_slices(const runfile::RecordedRun& run) {
   std::set<int64_t> whole;
   if (run.pressure.time_s.empty() || run.pump.time_s.empty()) return whole;
   const double until_s = std::min(run.pressure.time_s.back(), run.pump.time_s.back()) + 2.0 / 300;
@@ -92,19 +96,37 @@ size_t raised_triggers(const std::filesystem::path& pins) {
   return raised;
 }
 
-/// How often each slice was imaged whole, by the run files that are made of the journals.
-std::map<int64_t, int> imaged(const RigWithDaemon& rig, size_t& triggers) {
-  std::map<int64_t, int> times;
+/// What the run files hold that are made of the journals.
+struct Recorded {
+  std::map<int64_t, int> times;  ///< that each slice was imaged whole
+  SamplesOfRuns samples;
+  size_t triggers = 0;
+};
+
+Recorded recorded_by(const RigWithDaemon& rig) {
+  Recorded recorded;
   for (const auto& entry : std::filesystem::directory_iterator(rig.place / "journals")) {
     if (entry.path().extension() != ".journal") continue;
     const flow::Ended recovered =
         flow::run(rig.place, {"diastole", "recover", entry.path(), "-o", "part.run.h5", "--force", "--json"});
     EXPECT_LE(recovered.exit_code, 1) << recovered.err;
     if (recovered.json()["run"].is_null()) continue;
-    for (const int64_t slice : whole_slices(rig.place / "part.run.h5", triggers))
-      ++times[slice];
+    const auto run = runfile::read_run(rig.place / "part.run.h5");
+    recorded.triggers += run.trigger_s.size();
+    recorded.samples[run.run_id] =
+        run.pressure.time_s.size() - static_cast<size_t>(run.missing(runfile::pressure_stream));
+    for (const int64_t slice : whole_slices(run))
+      ++recorded.times[slice];
   }
-  return times;
+  return recorded;
+}
+
+/// Of any run, of what its daemon had received.
+uint64_t most_lost_samples(const SamplesOfRuns& received, SamplesOfRuns recorded) {
+  uint64_t most = 0;
+  for (const auto& [run_id, samples] : received)
+    most = std::max(most, samples - std::min(samples, recorded[run_id]));
+  return most;
 }
 
 /// The connection before gives the control back when the daemon sees its end, which may be a moment later.
@@ -123,15 +145,17 @@ void resume_with_control(DaemonClient& client) {
 TEST(Faults, SessionKilledAndResumed) {
   int kills = 0;
   size_t unrecorded = 0;
+  uint64_t lost_samples = 0;
   const int tried = trials(1, 18);
   const int survived = survivors(tried, [&](int, std::mt19937& random) {
     RigWithDaemon rig(RigWithDaemon::Time::conducted, flow::source_text("examples/rig.toml"),
                       {"--pins", "pins.csv"});
     bool done = false;
+    SamplesOfRuns received;
     for (int attempt = 0; !done && attempt < 100; ++attempt) {
       const bool kill = attempt < kills_per_session;
-      done =
-          run_or_kill(rig, attempt > 0, kill ? static_cast<uint64_t>(between(random, 0, 1200)) : 1'000'000);
+      done = run_or_kill(rig, attempt > 0, kill ? static_cast<uint64_t>(between(random, 0, 1200)) : 1'000'000,
+                         received);
       kills += done ? 0 : 1;
     }
     if (!done) return false;
@@ -141,19 +165,25 @@ TEST(Faults, SessionKilledAndResumed) {
     EXPECT_EQ(rig.daemon->wait().exit_code, 0);
     rig.daemon.reset();
     rig.end_rig();
-    size_t recorded = 0;
-    const std::map<int64_t, int> times = imaged(rig, recorded);
-    unrecorded = std::max(unrecorded, raised_triggers(rig.place / "pins.csv") - recorded);
-    const bool each_once = std::ssize(times) == slices &&
-                           std::ranges::all_of(times, [](const auto& slice) { return slice.second == 1; });
-    EXPECT_TRUE(each_once) << json(times).dump();
+    const Recorded recorded = recorded_by(rig);
+    const size_t cycles = raised_triggers(rig.place / "pins.csv") - recorded.triggers;
+    EXPECT_LE(static_cast<double>(cycles) * period_s, kills_per_session * most_lost_s);
+    unrecorded = std::max(unrecorded, cycles);
+    const uint64_t lost = most_lost_samples(received, recorded.samples);
+    EXPECT_LE(static_cast<double>(lost), most_lost_s * sample_rate_Hz);
+    lost_samples = std::max(lost_samples, lost);
+    const bool each_once =
+        std::ssize(recorded.times) == slices &&
+        std::ranges::all_of(recorded.times, [](const auto& slice) { return slice.second == 1; });
+    EXPECT_TRUE(each_once) << json(recorded.times).dump();
     return each_once;
   });
   EXPECT_GE(kills, 8 * tried);
-  add_to_table(
-      {"session killed, resumed", fmt::format("{} kills at random moments of a study", kills), tried,
-       survived,
-       fmt::format("no slice lost or repeated; {} cycles of a session unrecorded at most", unrecorded)});
+  add_to_table({"session killed, resumed", fmt::format("{} kills at random moments of a study", kills), tried,
+                survived,
+                fmt::format("no slice lost or repeated; {} received samples of a run and {} cycles of a "
+                            "session unrecorded at most",
+                            lost_samples, unrecorded)});
 }
 
 }  // namespace

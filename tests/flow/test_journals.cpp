@@ -92,6 +92,24 @@ TEST(Journals, AStartThatFailsAfterTheLoadLeavesNothingArmedAndNoJournal) {
   EXPECT_EQ(status_when(client, "homed", true)["journals"]["count"], 1);
 }
 
+TEST(Journals, AProgramThatTheControllerRefusesLeavesNothingArmedAndNoJournal) {
+  RigWithDaemon rig(RigWithDaemon::Time::conducted);
+  rig.start_daemon();
+  auto client = rig.client();
+  home(client);
+  json wild = many_segments();
+  wild["experiment"] = wild["experiment"].get<std::string>() +
+                       "[[segment]]\nwaveform = \"parabolic\"\nstroke_mL = 400.0\nperiod_s = 0.3\n";
+  EXPECT_THAT(message_of<InputError>([&] { client.call("run.start", wild); }),
+              AllOf(HasSubstr("segment[60]"), HasSubstr("the controller refuses it")));
+  const json status = client.call("rig.status");
+  EXPECT_EQ(status["state"], "homed");
+  EXPECT_EQ(status["journals"]["count"], 0);
+  client.call("run.start", many_segments());
+  client.call("run.stop");
+  EXPECT_EQ(status_when(client, "homed", true)["journals"]["count"], 1);
+}
+
 TEST(Journals, StatusAndListTellWhatIsKept) {
   RigWithDaemon rig(RigWithDaemon::Time::conducted);
   rig.start_daemon();
