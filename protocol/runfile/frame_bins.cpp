@@ -9,7 +9,9 @@
 
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/cycles.hpp"
+#include "protocol/runfile/layout.hpp"
 #include "protocol/runfile/spacing.hpp"
+#include "protocol/signal/median.hpp"
 
 namespace diastole::runfile {
 namespace {
@@ -202,7 +204,47 @@ std::string irregular_interval(const SegmentTriggers& segment, size_t i, int64_t
 struct UsedCycle {
   double number;  // within the segment
   std::vector<FrameSamples> frames;
+  size_t trigger;  // of the segment's
+  double trigger_s;
 };
+
+/// How far each cycle lies from the middle one: root mean square over the frames. Precondition: one or more.
+std::vector<double> distances_kPa(const std::vector<UsedCycle>& cycles) {
+  const size_t frames = cycles.front().frames.size();
+  std::vector<double> squares(cycles.size(), 0), of_frame(cycles.size());
+  for (size_t k = 0; k < frames; ++k) {
+    std::ranges::transform(cycles, of_frame.begin(),
+                           [&](const UsedCycle& cycle) { return cycle.frames[k].mean_kPa; });
+    const double middle_kPa = signal::median(of_frame);
+    for (size_t i = 0; i < cycles.size(); ++i)
+      squares[i] += (of_frame[i] - middle_kPa) * (of_frame[i] - middle_kPa) / static_cast<double>(frames);
+  }
+  for (double& square : squares)
+    square = std::sqrt(square);
+  return squares;
+}
+
+std::vector<ExcludedCycle> take_outliers(std::vector<UsedCycle>& cycles, double resolution_kPa) {
+  constexpr size_t fewest_cycles = 5;
+  constexpr double usual_distances = 8;
+  if (cycles.size() < fewest_cycles) return {};
+  const std::vector<double> distance_kPa = distances_kPa(cycles);
+  const double usual_kPa = signal::median(distance_kPa);
+  std::vector<ExcludedCycle> outliers;
+  std::vector<UsedCycle> kept;
+  for (size_t i = 0; i < cycles.size(); ++i) {
+    if (!(distance_kPa[i] > usual_distances * usual_kPa + resolution_kPa)) {
+      kept.push_back(std::move(cycles[i]));
+      continue;
+    }
+    outliers.push_back(
+        {cycles[i].trigger, cycles[i].trigger_s,
+         fmt::format("lies {:.3g} kPa from the middle cycle, where half of them lie within {:.3g}",
+                     distance_kPa[i], usual_kPa)});
+  }
+  cycles = std::move(kept);
+  return outliers;
+}
 
 FrameBin summarise(const FrameWindow& window, size_t k, const std::vector<UsedCycle>& cycles) {
   const auto n = static_cast<double>(cycles.size());
@@ -294,7 +336,7 @@ FrameBins bin_frames(const RecordedRun& run, const RunRows& rows, const FrameBin
     CycleFrames cycle = frames_of_cycle(samples, windows, from_s, bins.interval_s);
     if (cycle.exclusion.empty()) cycle.exclusion = irregular_interval(segment, i, options.gate_every);
     if (cycle.exclusion.empty()) {
-      used.push_back({static_cast<double>(trigger.cycle), std::move(cycle.frames)});
+      used.push_back({static_cast<double>(trigger.cycle), std::move(cycle.frames), i, trigger.time_s});
     } else {
       frames_too_short = frames_too_short || cycle.frame_without_sample;
       bins.excluded.push_back({i, trigger.time_s, std::move(cycle.exclusion)});
@@ -309,6 +351,8 @@ FrameBins bin_frames(const RecordedRun& run, const RunRows& rows, const FrameBin
                                         1e3 * samples.spacing().median_s)
                           : "Record again, or choose another segment.");
   }
+  if (options.without_outliers)
+    bins.outliers = take_outliers(used, options.channel == cavity_channel ? cavity_resolution_kPa(run) : 0);
   for (size_t k = 0; k < windows.size(); ++k) {
     bins.frames.push_back(summarise(windows[k], k, used));
   }

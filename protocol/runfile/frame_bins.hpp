@@ -16,6 +16,10 @@
 // frames, and reported with its reason. Where a run has slices, only their cycles are imaged: dummy cycles and
 // those between slices do not count at all.
 //
+// One wild cycle would make sd_kPa its own size. With `without_outliers` a cycle is left out that lies further from the middle
+// cycle (the median of each frame) than eight times the median distance of all, and a step of the converter; the distance is the
+// root mean square over the frames. Of fewer than five cycles none is known to be wild.
+//
 // What delays the signal (catheter, filter) by d shows at t + d what the pressure was at t. With
 // `delay_s` = d, the samples from from_s + d to to_s + d make the frame.
 //
@@ -41,6 +45,7 @@ struct FrameBinOptions {
   std::string channel = "cavity_kPa";
   int64_t gate_every = 1;  ///< the interval is this many periods
   double delay_s = 0;      ///< of the signal behind the pressure
+  bool without_outliers = false;
 };
 
 struct FrameBin {
@@ -69,6 +74,7 @@ struct FrameBins {
   size_t triggers = 0;           ///< found in the segment, or in the slices
   std::vector<FrameBin> frames;
   std::vector<ExcludedCycle> excluded;
+  std::vector<ExcludedCycle> outliers;  ///< whole and in time, but wild
 };
 
 /// gate_every periods of the segment that `options` choose. Throws InputError as bin_frames does.

@@ -101,7 +101,7 @@ def of_explanation(found: results.Explanation) -> str:
 
 
 def of_comparison(found: results.Comparison) -> str:
-    shown = f"<b>traces {'not tested' if not found.is_tested else 'differ' if found.beyond_noise else 'agree'}</b>"
+    shown = f"<b>traces {'not tested' if not found.is_tested else 'differ' if found.beyond_noise else 'may agree or differ' if found.undecided else 'agree'}</b>"
     shown += table(("", "", *found.runs), [(d.group, d.place, *d.values) for d in found.differences])
     for overlay in found.overlays:
         shown += plot([(found.runs[c.run], overlay.phase, [math.nan if v is None else v for v in c.mean_kPa]) for c in overlay.cycles],

@@ -190,6 +190,7 @@ class Comparison(Record):
     remarks: list[str]
     is_tested: bool
     beyond_noise: bool
+    undecided: bool
     page: str | None
 
 @dataclass(frozen=True)
@@ -233,7 +234,10 @@ class RunDeparture(Record):
     worst_phase: float
     worst_in_errors: float
     limit_in_errors: float
+    allowed_Pa: float | None
+    range_Pa: float | None
     beyond_noise: bool
+    undecided: bool
 
 @dataclass(frozen=True)
 class Solution(Record):

@@ -70,6 +70,34 @@ TEST(FrameBins, ACycleWithAMissingSampleIsExcludedAndTold) {
   EXPECT_DOUBLE_EQ(bins.frames[0].sd_kPa, 0);
 }
 
+TEST(FrameBins, AWildCycleIsLeftOutIfThatIsAskedFor) {
+  RecordedRun run;
+  run.segments = {{0, "parabolic", 10, 1, 0, 6}};
+  for (int i = 0; i < 61; ++i) {
+    const int cycle = i / 10;
+    if (i % 10 == 0 && cycle < 6) run.trigger_s.push_back(cycle);
+    run.pressure.time_s.push_back(0.1 * i);
+    // Cycles scatter by 0.1 kPa or so; the fifth is beside them in its second half.
+    run.pressure.channels["cavity_kPa"].push_back(i % 10 + 0.1 * (cycle % 3) + (i >= 45 && i < 50 ? 40 : 0));
+  }
+  const FrameBins plain = bin_frames(run, {.frames = 2});
+  EXPECT_EQ(plain.frames[1].cycles, 6U);
+  EXPECT_GT(plain.frames[1].sd_kPa, 10);
+  const FrameBins bins = bin_frames(run, {.frames = 2, .without_outliers = true});
+  EXPECT_EQ(bins.frames[1].cycles, 5U);
+  EXPECT_LT(bins.frames[1].sd_kPa, 0.2);
+  ASSERT_EQ(bins.outliers.size(), 1U);
+  EXPECT_EQ(bins.outliers[0].cycle, 4U);
+  EXPECT_DOUBLE_EQ(bins.outliers[0].trigger_s, 4);
+  EXPECT_THAT(bins.outliers[0].reason, HasSubstr("from the middle cycle"));
+  EXPECT_TRUE(bins.excluded.empty());
+
+  run.segments.front().cycles = 4;
+  run.trigger_s.resize(4);
+  run.pressure.channels["cavity_kPa"][20] = 1000;
+  EXPECT_TRUE(bin_frames(run, {.frames = 2, .without_outliers = true}).outliers.empty());
+}
+
 TEST(FrameBins, AHoleInTheTimesExcludesItsCycle) {
   RecordedRun run = staircase();
   run.pressure.time_s.erase(run.pressure.time_s.begin() + 25);

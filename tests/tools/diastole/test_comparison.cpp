@@ -1,4 +1,4 @@
-// What tells runs apart: an effect of a given size is found, noise is not.
+// What distinguishes runs: an effect of a given size is found, noise is not, and where noise is too large nothing is claimed.
 
 #include <gmock/gmock.h>
 
@@ -11,6 +11,7 @@ namespace diastole::comparison {
 namespace {
 
 using runfile::RecordedRun;
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
@@ -32,6 +33,24 @@ RecordedRun recorded(unsigned seed, double gain = 1, double offset_kPa = 0, doub
   }
   for (int cycle = 0; cycle < 20; ++cycle)
     run.trigger_s.push_back(1.2 * cycle);
+  for (int i = 0; i <= 240; ++i) {
+    run.pump.time_s.push_back(i / 10.0);
+    run.pump.commanded_mL.push_back(stroke_mL * 0.5 * (1 - std::cos(2 * M_PI * i / 12.0)));
+  }
+  return run;
+}
+
+/// Adds a pressure to the samples of one cycle.
+void raise(RecordedRun& run, int cycle, double by_kPa) {
+  std::vector<double>& cavity_kPa = run.pressure.channels["cavity_kPa"];
+  for (size_t i = 0; i < cavity_kPa.size(); ++i)
+    if (std::floor(run.pressure.time_s[i] / 1.2 + 1e-9) == cycle) cavity_kPa[i] += by_kPa;
+}
+
+/// The same run with its segment played from points, which peak at this part of the period.
+RecordedRun uploaded(RecordedRun run, double peak_phase) {
+  run.segments.front().waveform = "uploaded";
+  run.waveforms[0] = {"", {0, peak_phase, 1}, {0, 1, 0}};
   return run;
 }
 
@@ -83,6 +102,71 @@ TEST(RunComparison, WhatWasSetOtherwiseIsNamedAndAnotherMotionIsNotTested) {
   EXPECT_THAT(comparison_page(found), HasSubstr("not tested"));
 }
 
+TEST(RunComparison, OneWildCycleHidesNoGainAndIsNamed) {
+  RecordedRun wild = recorded(2, 1.05);
+  raise(wild, 7, 100);
+  const Comparison found = compared({recorded(1), wild});
+  const Departure& departure = found.overlays.front().departures.front();
+  EXPECT_TRUE(departure.beyond_noise());
+  EXPECT_NEAR(departure.gain, 1.05, 0.003);
+  EXPECT_THAT(found.remarks,
+              testing::ElementsAre(AllOf(HasSubstr("run-2.run.h5: segment 0, cavity_kPa: 1 of 20 cycles"),
+                                         HasSubstr("cycle 7 lies 100 kPa from"))));
+
+  RecordedRun same = recorded(3);
+  raise(same, 7, 100);
+  EXPECT_FALSE(compared({recorded(1), same}).beyond_noise());
+  EXPECT_FALSE(compared({recorded(1), same}).undecided());
+}
+
+TEST(RunComparison, NoiseThatIsLargeBesideTheTraceDecidesNothing) {
+  RecordedRun scattered = recorded(2, 1.05);
+  for (int cycle = 0; cycle < 20; ++cycle)
+    raise(scattered, cycle, cycle % 2 == 0 ? 5 : -5);
+  const Comparison found = compared({recorded(1), scattered});
+  EXPECT_FALSE(found.beyond_noise());
+  EXPECT_TRUE(found.undecided());
+  EXPECT_NEAR(found.overlays.front().departures.front().allowed_Pa, 5000, 500);
+  EXPECT_THAT(comparison_page(found), HasSubstr("may agree or differ"));
+  EXPECT_FALSE(compared({recorded(1), recorded(2)}).undecided());
+}
+
+TEST(RunComparison, ReportsWhatIsNotSound) {
+  RecordedRun unsound = recorded(2);
+  unsound.events.push_back({3.0, "error", "daq_lost", "no answer"});
+  EXPECT_THAT(compared({recorded(1), unsound}).remarks,
+              testing::ElementsAre(AllOf(HasSubstr("run-2.run.h5: is not sound"), HasSubstr("daq_lost"))));
+}
+
+TEST(RunComparison, OtherPointsOfAnUploadedWaveformAreAnotherMotion) {
+  const RecordedRun early = uploaded(recorded(1), 0.3), late = uploaded(recorded(2), 0.6);
+  const Comparison found = compared({early, late});
+  ASSERT_EQ(found.differences.size(), 1);
+  EXPECT_EQ(found.differences.front().place, "segment 0 played");
+  EXPECT_THAT(found.differences.front().values,
+              testing::ElementsAre(HasSubstr("peak at 0.3"), HasSubstr("peak at 0.6")));
+  EXPECT_FALSE(found.is_tested());
+  EXPECT_THAT(found.remarks, testing::ElementsAre(HasSubstr("another motion")));
+  EXPECT_TRUE(compared({early, uploaded(recorded(3), 0.3)}).is_tested());
+}
+
+TEST(RunComparison, WhatTheExperimentsStateOtherwiseIsNamed) {
+  RecordedRun plain = recorded(1), gated = recorded(2);
+  plain.protocol_toml = "rest_s = 1\n[[segment]]\nwaveform = \"parabolic\"\nstroke_mL = 40.0\n";
+  gated.protocol_toml =
+      "gate_every = 2\nrest_s = 3.0\n[[segment]]\nwaveform = \"parabolic\"\nstroke_mL = 40\n"
+      "[[schedule.block]]\nname = \"tagged\"\n";
+  std::string words;
+  for (const Difference& difference : compared({plain, gated}).differences)
+    words += difference.group + ": " + difference.place + " " + difference.values[0] + "|" +
+             difference.values[1] + "\n";
+  EXPECT_EQ(words,
+            "protocol: gate_every |2\nprotocol: rest_s 1|3\nprotocol: schedule.block[0].name |tagged\n");
+  gated.protocol_toml = "no toml";
+  EXPECT_THAT(compared({gated, gated}).differences, IsEmpty());
+  EXPECT_FALSE(compared({plain, gated}).differences.empty());
+}
+
 TEST(RunComparison, WhatARunLacksIsTold) {
   RecordedRun longer = recorded(2);
   longer.segments.push_back({24.0, "sinusoidal", 40, 1.2, 0, 20});
@@ -90,7 +174,8 @@ TEST(RunComparison, WhatARunLacksIsTold) {
   longer.pressure.channels["pump_kPa"] = longer.pressure.channels["cavity_kPa"];
   const std::string pump = "pump_kPa is not in all runs: not compared";
   EXPECT_THAT(compared({recorded(1), longer}).remarks,
-              testing::ElementsAre("run-2.run.h5: segment 1: the first run has none: not tested", pump));
+              testing::ElementsAre(HasSubstr("is not sound"),
+                                   "run-2.run.h5: segment 1: the first run has none: not tested", pump));
   EXPECT_THAT(compared({longer, recorded(1)}).remarks,
               testing::Contains("run-1.run.h5: segment 1: this run has none: not tested"));
 }

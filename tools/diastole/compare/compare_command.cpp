@@ -25,9 +25,11 @@ DIASTOLE_MEMBERS(MeanCycle, run, cycles, mean_kPa, sd_kPa, error_kPa)
 template <class Visit, IsRecord<Departure> Record>
 void each_member(Visit&& visit, Record& departure) {
   DIASTOLE_VISIT(visit, departure, run, offset_Pa, gain, rms_Pa, worst_Pa, worst_phase, worst_in_errors,
-                 limit_in_errors)
+                 limit_in_errors, allowed_Pa, range_Pa)
   const bool beyond_noise = departure.beyond_noise();
   visit("beyond_noise", beyond_noise);
+  const bool undecided = departure.undecided();
+  visit("undecided", undecided);
 }
 
 DIASTOLE_MEMBERS(Overlay, segment, channel, period_s, phase, cycles, departures)
@@ -40,6 +42,8 @@ void each_member(Visit&& visit, Record& comparison) {
   visit("is_tested", is_tested);
   const bool beyond_noise = comparison.beyond_noise();
   visit("beyond_noise", beyond_noise);
+  const bool undecided = comparison.undecided();
+  visit("undecided", undecided);
 }
 
 }  // namespace comparison
@@ -54,6 +58,12 @@ struct CompareOptions {
   size_t parts = 40;
   bool force = false;
 };
+
+std::string undecided_words(const comparison::Departure& departure) {
+  if (departure.allowed_Pa <= 0) return "; the noise is not known";
+  return fmt::format("; noise allows {} Pa of a trace of {} Pa", report::number(departure.allowed_Pa, 3),
+                     report::number(departure.range_Pa, 3));
+}
 
 void show(const Comparison& found) {
   for (size_t i = 0; i < found.files.size(); ++i)
@@ -71,12 +81,15 @@ void show(const Comparison& found) {
     for (const comparison::Departure& departure : overlay.departures) {
       fmt::print(
           "segment {} {}: [{}] {} [0]: offset {} Pa, gain {}, rms {} Pa; worst {} Pa at phase {:.2f}, {} "
-          "errors of {} allowed\n",
+          "errors of {} allowed{}\n",
           overlay.segment, overlay.channel, departure.run,
-          departure.beyond_noise() ? "differs from" : "agrees with", report::number(departure.offset_Pa, 3),
-          report::number(departure.gain, 5), report::number(departure.rms_Pa, 3),
-          report::number(departure.worst_Pa, 3), departure.worst_phase,
-          report::number(departure.worst_in_errors, 3), report::number(departure.limit_in_errors, 3));
+          departure.undecided()      ? "may agree with or differ from"
+          : departure.beyond_noise() ? "differs from"
+                                     : "agrees with",
+          report::number(departure.offset_Pa, 3), report::number(departure.gain, 5),
+          report::number(departure.rms_Pa, 3), report::number(departure.worst_Pa, 3), departure.worst_phase,
+          report::number(departure.worst_in_errors, 3), report::number(departure.limit_in_errors, 3),
+          departure.undecided() ? undecided_words(departure) : "");
     }
   }
   if (!found.is_tested()) fmt::print("no pressure could be tested against noise\n");

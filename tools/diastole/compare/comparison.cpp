@@ -1,10 +1,10 @@
 #include "tools/diastole/compare/comparison.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <numeric>
 #include <set>
 
@@ -12,6 +12,8 @@
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/frame_bins.hpp"
 #include "protocol/runfile/layout.hpp"
+#include "protocol/runfile/soundness.hpp"
+#include "tools/diastole/compare/differences.hpp"
 
 namespace diastole::comparison {
 namespace {
@@ -22,73 +24,23 @@ using runfile::Segment;
 
 constexpr double false_alarm = 0.01;
 
-std::string in_words(const runfile::Attribute& value) {
-  return std::visit([](const auto& v) { return fmt::format("{}", v); }, value);
+/// Which cycles were left out; of many, the first.
+std::string outlier_words(const std::vector<runfile::ExcludedCycle>& outliers, size_t kept) {
+  constexpr size_t most_named = 8;
+  std::vector<size_t> named;
+  for (size_t i = 0; i < std::min(most_named, outliers.size()); ++i)
+    named.push_back(outliers[i].cycle);
+  return fmt::format("{} of {} cycles left out as outside the scatter of the others ({}{}): cycle {} {}",
+                     outliers.size(), outliers.size() + kept, fmt::join(named, ", "),
+                     outliers.size() > most_named ? ", ..." : "", named.front(), outliers.front().reason);
 }
 
-/// Adds a difference unless all values are equal.
-void add(Comparison& comparison, const std::string& group, const std::string& place,
-         std::vector<std::string> values) {
-  const bool same =
-      std::ranges::all_of(values, [&](const std::string& value) { return value == values.front(); });
-  if (!same) comparison.differences.push_back({group, place, std::move(values)});
-}
-
-using Facts = std::map<std::string, runfile::Attribute, std::less<>>;
-
-void add_facts(Comparison& comparison, const std::vector<const Facts*>& facts,
-               const std::function<std::string(const std::string&)>& group_of) {
-  std::set<std::string> names;
-  for (const Facts* of_run : facts)
-    for (const auto& [name, value] : *of_run)
-      names.insert(name);
-  for (const std::string& name : names) {
-    std::vector<std::string> values;
-    for (const Facts* of_run : facts) {
-      const auto found = of_run->find(name);
-      values.push_back(found == of_run->end() ? "" : in_words(found->second));
-    }
-    add(comparison, group_of(name), name, std::move(values));
-  }
-}
-
-/// What `diastole calibrate` and `diastole zero` determine of a channel.
-bool is_calibration(const std::string& name) {
-  return std::ranges::any_of(
-      std::array{"_kPa_per_V", "_zero_V", "_calibrated_utc", "_calibrated_by", "_zeroed_utc", "_zeroed_by"},
-      [&](const char* ending) { return name.ends_with(ending); });
-}
-
-void add_protocol(Comparison& comparison, const std::vector<RunFile>& runs) {
-  const auto add_of_runs = [&](const std::string& place, const auto& value_of) {
-    std::vector<std::string> values;
-    for (const RunFile& file : runs)
-      values.push_back(value_of(file.run));
-    add(comparison, "protocol", place, std::move(values));
-  };
-  add_of_runs("segments", [](const RecordedRun& run) { return fmt::format("{}", run.segments.size()); });
-  size_t most = 0;
-  for (const RunFile& file : runs)
-    most = std::max(most, file.run.segments.size());
-  for (size_t i = 0; i < most; ++i) {
-    const auto add_member = [&](const char* name, const auto& member) {
-      add_of_runs(fmt::format("segment {} {}", i, name), [&](const RecordedRun& run) {
-        return i < run.segments.size() ? fmt::format("{}", run.segments[i].*member) : std::string();
-      });
-    };
-    add_member("waveform", &Segment::waveform);
-    add_member("stroke_mL", &Segment::stroke_mL);
-    add_member("period_s", &Segment::period_s);
-    add_member("offset_mL", &Segment::offset_mL);
-    add_member("cycles", &Segment::cycles);
-  }
-  add_of_runs("trigger delay_s",
-              [](const RecordedRun& run) { return fmt::format("{}", run.trigger_delay_s); });
-  add_of_runs("slices", [](const RecordedRun& run) { return fmt::format("{}", run.slices.size()); });
-}
-
-MeanCycle mean_cycle(const RunFile& file, size_t number, const runfile::FrameBinOptions& options) {
+MeanCycle mean_cycle(const RunFile& file, size_t number, const runfile::FrameBinOptions& options,
+                     std::vector<std::string>& remarks) {
   const runfile::FrameBins bins = runfile::bin_frames(file.run, file.rows, options);
+  if (!bins.outliers.empty())
+    remarks.push_back(fmt::format("{}: segment {}, {}: {}", file.run.file, bins.segment, options.channel,
+                                  outlier_words(bins.outliers, bins.frames.front().cycles)));
   const double resolution_kPa =
       options.channel == runfile::cavity_channel ? runfile::cavity_resolution_kPa(file.run) : 0;
   MeanCycle cycle{.run = number, .cycles = 0, .mean_kPa = {}, .sd_kPa = {}, .error_kPa = {}};
@@ -101,12 +53,20 @@ MeanCycle mean_cycle(const RunFile& file, size_t number, const runfile::FrameBin
   return cycle;
 }
 
+/// Both followed the same points, or neither followed any.
+bool same_points(const RecordedRun& a, const RecordedRun& b, size_t segment) {
+  const auto x = a.waveforms.find(segment), y = b.waveforms.find(segment);
+  if (x == a.waveforms.end() || y == b.waveforms.end())
+    return x == a.waveforms.end() && y == b.waveforms.end();
+  return x->second.phase == y->second.phase && x->second.fraction == y->second.fraction;
+}
+
 /// Volumes are whole steps of some µL: equal motions are equal to the digit that the experiment states.
 bool same_motion(const RecordedRun& a, const RecordedRun& b, size_t segment) {
   if (segment >= a.segments.size() || segment >= b.segments.size()) return false;
   const Segment &x = a.segments[segment], &y = b.segments[segment];
   return x.waveform == y.waveform && x.stroke_mL == y.stroke_mL && x.period_s == y.period_s &&
-         x.offset_mL == y.offset_mL;
+         x.offset_mL == y.offset_mL && same_points(a, b, segment);
 }
 
 /// Slope of b over a; 1 where a does not move.
@@ -130,10 +90,16 @@ double welch_dof(double variance_a, size_t cycles_a, double variance_b, size_t c
           variance_b * variance_b / static_cast<double>(cycles_b - 1));
 }
 
+double range_Pa(const MeanCycle& cycle) {
+  const auto [least_kPa, most_kPa] = std::ranges::minmax(cycle.mean_kPa);
+  return 1e3 * (most_kPa - least_kPa);
+}
+
 /// Precondition: both have two cycles or more.
 Departure departure_of(const MeanCycle& first, const MeanCycle& other, const std::vector<double>& phase,
                        double probability) {
   Departure departure{.run = other.run};
+  departure.range_Pa = std::min(range_Pa(first), range_Pa(other));
   const auto parts = static_cast<double>(phase.size());
   double worst_share = -1;
   for (size_t i = 0; i < phase.size(); ++i) {
@@ -142,9 +108,11 @@ Departure departure_of(const MeanCycle& first, const MeanCycle& other, const std
     departure.rms_Pa += difference_Pa * difference_Pa / parts;
     const double variance_a = std::pow(first.error_kPa[i], 2), variance_b = std::pow(other.error_kPa[i], 2);
     if (!(variance_a > 0 && variance_b > 0)) continue;
-    const double in_errors = std::abs(difference_Pa) / (1e3 * std::sqrt(variance_a + variance_b));
+    const double error_Pa = 1e3 * std::sqrt(variance_a + variance_b);
+    const double in_errors = std::abs(difference_Pa) / error_Pa;
     const double limit = inference::student_quantile(
         welch_dof(variance_a, first.cycles, variance_b, other.cycles), probability);
+    departure.allowed_Pa = std::max(departure.allowed_Pa, limit * error_Pa);
     if (in_errors / limit <= worst_share) continue;
     worst_share = in_errors / limit;
     departure.worst_Pa = difference_Pa;
@@ -177,14 +145,27 @@ Overlay overlay_of(const std::vector<RunFile>& runs, size_t segment, const std::
   for (size_t number = 0; number < runs.size(); ++number) {
     if (segment >= runs[number].run.segments.size()) continue;
     try {
-      overlay.cycles.push_back(
-          mean_cycle(runs[number], number, {.frames = parts, .segment = segment, .channel = channel}));
+      overlay.cycles.push_back(mean_cycle(
+          runs[number], number,
+          {.frames = parts, .segment = segment, .channel = channel, .without_outliers = true}, remarks));
     } catch (const InputError& error) {
       remarks.push_back(
           fmt::format("{}: segment {}: {}", runs[number].run.file, segment, error.fault().problem));
     }
   }
   return overlay;
+}
+
+void remark_what_is_not_sound(const std::vector<RunFile>& runs, std::vector<std::string>& remarks) {
+  for (const RunFile& file : runs) {
+    const std::vector<std::string> problems = runfile::assess(file.run, file.rows).problems;
+    if (problems.empty()) continue;
+    remarks.push_back(fmt::format("{}: is not sound: {}{}", file.run.file, problems.front(),
+                                  problems.size() == 1 ? ""
+                                                       : fmt::format("; and {} more problems, which "
+                                                                     "`diastole inspect` lists",
+                                                                     problems.size() - 1)));
+  }
 }
 
 /// Segments and channels that some runs have and others lack.
@@ -226,20 +207,19 @@ bool Comparison::beyond_noise() const {
   });
 }
 
+bool Comparison::undecided() const {
+  return std::ranges::any_of(overlays, [](const Overlay& overlay) {
+    return std::ranges::any_of(overlay.departures, &Departure::undecided);
+  });
+}
+
 Comparison compare(const std::vector<RunFile>& runs, const std::vector<runfile::Session>& sessions,
                    size_t parts) {
   Comparison comparison;
-  std::vector<const Facts*> of_sessions, of_rigs;
-  for (const RunFile& file : runs) {
+  for (const RunFile& file : runs)
     comparison.files.push_back(file.run.file);
-    of_rigs.push_back(&file.run.rig);
-  }
-  for (const runfile::Session& session : sessions)
-    of_sessions.push_back(&session.facts);
-  add_facts(comparison, of_sessions, [](const std::string&) { return "session"; });
-  add_protocol(comparison, runs);
-  add_facts(comparison, of_rigs,
-            [](const std::string& name) { return is_calibration(name) ? "calibration" : "rig"; });
+  add_differences(comparison, runs, sessions);
+  remark_what_is_not_sound(runs, comparison.remarks);
   for (size_t segment = 0; segment < runs.front().run.segments.size(); ++segment) {
     if (runs.front().run.segments[segment].waveform == "hold") continue;
     for (const std::string& channel : channels_of(runs))

@@ -7,7 +7,8 @@
 //   |m_b - m_a| > t(nu, 1 %) sqrt(v_a + v_b)
 //
 // with Student's t for Welch's number of degrees of freedom nu, and 1 % shared out over all parts of all segments, channels and runs
-// that are tested: a comparison of equal runs says so wrongly once in a hundred.
+// that are tested: a comparison of equal runs says so wrongly once in a hundred. Wild cycles are left out of mean and scatter (frame_bins.hpp)
+// and named. Where the noise allows a difference beyond a tenth of the trace's range, that none was found means nothing.
 
 #include <cstddef>
 #include <optional>
@@ -29,7 +30,7 @@ struct Difference {
 /// A run's mean cycle.
 struct MeanCycle {
   size_t run = 0;                 ///< number of the run
-  size_t cycles = 0;              ///< that were averaged
+  size_t cycles = 0;              ///< that were averaged, without wild ones
   std::vector<double> mean_kPa;   ///< of each part
   std::vector<double> sd_kPa;     ///< over the cycles
   std::vector<double> error_kPa;  ///< of the mean
@@ -45,7 +46,14 @@ struct Departure {
   double worst_phase = 0;      ///< there
   double worst_in_errors = 0;  ///< there
   double limit_in_errors = 0;  ///< beyond it, it is no noise
+  double allowed_Pa = 0;       ///< the largest difference in any part that may be noise
+  double range_Pa = 0;         ///< of the mean cycle that has less
   [[nodiscard]] bool beyond_noise() const { return worst_in_errors > limit_in_errors; }
+  /// Neither: the noise is not known, or is large beside the trace.
+  [[nodiscard]] bool undecided() const {
+    constexpr double most_of_range = 0.1;
+    return !beyond_noise() && !(allowed_Pa > 0 && allowed_Pa <= most_of_range * range_Pa);
+  }
 };
 
 struct Overlay {
@@ -61,10 +69,11 @@ struct Comparison {
   std::vector<std::string> files;
   std::vector<Difference> differences;
   std::vector<Overlay> overlays;
-  std::vector<std::string> remarks;  ///< what could not be compared, and why
+  std::vector<std::string> remarks;  ///< what is not sound, was left out or could not be compared, and why
 
   [[nodiscard]] bool is_tested() const;  ///< any pressure against noise
   [[nodiscard]] bool beyond_noise() const;
+  [[nodiscard]] bool undecided() const;  ///< in any segment and channel
 };
 
 /// `sessions` of the same runs; `parts` of the period. Precondition: two or more runs.

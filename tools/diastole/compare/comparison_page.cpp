@@ -68,8 +68,13 @@ std::string comparison_page(const Comparison& comparison) {
   if (!comparison.is_tested()) {
     page.headline("traces", "not tested", "no motion that two runs share with noise that is known");
   } else {
-    page.headline("traces", comparison.beyond_noise() ? "differ" : "agree",
-                  comparison.beyond_noise() ? "by more than noise" : "within their noise");
+    page.headline("traces",
+                  comparison.beyond_noise() ? "differ"
+                  : comparison.undecided()  ? "may agree or differ"
+                                            : "agree",
+                  comparison.beyond_noise() ? "by more than noise"
+                  : comparison.undecided()  ? "noise is large beside the trace"
+                                            : "within their noise");
   }
   page.headline("runs", fmt::format("{}", comparison.files.size()), "each against the first");
   page.headline("settings and facts", fmt::format("{}", comparison.differences.size()),
@@ -98,7 +103,7 @@ std::string comparison_page(const Comparison& comparison) {
     page.table_of(
         overlay.departures,
         {"against the first run", "offset (Pa)", "gain", "rms (Pa)", "worst (Pa)", "at phase", "in errors",
-         "limit", ""},
+         "limit", "noise allows (Pa)", ""},
         [&](const Departure& departure) {
           return report::Page::Row{name_of(comparison.files[departure.run]),
                                    number(departure.offset_Pa, 3),
@@ -108,9 +113,13 @@ std::string comparison_page(const Comparison& comparison) {
                                    number(departure.worst_phase, 2),
                                    number(departure.worst_in_errors, 3),
                                    number(departure.limit_in_errors, 3),
-                                   departure.beyond_noise() ? "differs" : "agrees"};
+                                   number(departure.allowed_Pa, 3),
+                                   departure.undecided()      ? "may agree or differ"
+                                   : departure.beyond_noise() ? "differs"
+                                                              : "agrees"};
         },
-        "The limit is Student's t for the cycles at hand; equal runs pass it once in a hundred comparisons.");
+        "The limit is Student's t for the cycles at hand; equal runs pass it once in a hundred comparisons. "
+        "Where noise allows more than a tenth of the trace's range, runs may differ without its being seen.");
   }
   return page.html();
 }
