@@ -141,7 +141,7 @@ void add_run(Graph& graph, Json& mentions, const CratedRun& crated, const fs::pa
     rig.push_back({{"@type", "PropertyValue"},
                    {"name", runfile::room_temperature_fact},
                    {"value", *room_C},
-                   {"unitText", "C"}});
+                   {"unitText", runfile::unit_of(runfile::room_temperature_fact)}});
   // A crate's entities are flat: each property is one of its own.
   Json of_rig = Json::array();
   for (Json& property : rig) {

@@ -25,6 +25,7 @@
 // its values are NaN, and a row of /gaps declares it. Times are seconds on the controller's clock since the
 // run started.
 
+#include <array>
 #include <cstdint>
 #include <string_view>
 #include <tuple>
@@ -111,10 +112,37 @@ inline constexpr Table events_table{
     std::tuple{Column{"time_s", &Event::time_s}, Column{"level", &Event::level}, Column{"code", &Event::code},
                Column{"text", &Event::text}}};
 
-/// "mL" of "commanded_mL": the unit is what follows the last underscore; "1" if there is none.
+/// How a name ends that states a unit. Longer endings stand before those that they end with themselves.
+struct UnitEnding {
+  std::string_view ending;
+  std::string_view unit;
+};
+inline constexpr std::array unit_endings{UnitEnding{"_kPa_per_V", "kPa/V"},
+                                         UnitEnding{"_rev_per_cm", "rev/cm"},
+                                         UnitEnding{"_per_rev", "1/rev"},
+                                         UnitEnding{"_kg_m3", "kg/m3"},
+                                         UnitEnding{"_mL_s2", "mL/s2"},
+                                         UnitEnding{"_mL_s", "mL/s"},
+                                         UnitEnding{"_Pa_s", "Pa s"},
+                                         UnitEnding{"_m_s", "m/s"},
+                                         UnitEnding{"_kPa", "kPa"},
+                                         UnitEnding{"_mL", "mL"},
+                                         UnitEnding{"_mm", "mm"},
+                                         UnitEnding{"_um", "um"},
+                                         UnitEnding{"_m", "m"},
+                                         UnitEnding{"_ms", "ms"},
+                                         UnitEnding{"_s", "s"},
+                                         UnitEnding{"_Hz", "Hz"},
+                                         UnitEnding{"_V", "V"},
+                                         UnitEnding{"_ppm", "ppm"},
+                                         UnitEnding{"_degC", "degC"},
+                                         UnitEnding{"_C", "degC"}};
+
+/// "mL" of "commanded_mL", "kg/m3" of "fluid_density_kg_m3"; "1" of a name that states none.
 inline constexpr std::string_view unit_of(std::string_view name) {
-  const size_t underscore = name.rfind('_');
-  return underscore == std::string_view::npos ? std::string_view("1") : name.substr(underscore + 1);
+  for (const auto& [ending, unit] : unit_endings)
+    if (name.ends_with(ending)) return unit;
+  return "1";
 }
 
 }  // namespace diastole::runfile

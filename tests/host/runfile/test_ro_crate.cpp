@@ -30,6 +30,8 @@ TEST(RoCrate, IsFlatLinkedAndSaysWhatTheFilesHold) {
   std::ofstream(scratch / "gel.experiment.toml") << "abc";
   std::ofstream(scratch / "gel.fit.json") << "{}";
   CratedRun run{"gel.run.h5", "gel.experiment.toml", runfile::read_run(scratch / "gel.run.h5"), {}};
+  run.run.rig["fluid_density_kg_m3"] = 1005.0;
+  run.run.rig["hose_creep_fraction"] = 0.05;
   run.session.facts = {
       {"specimen", std::string("gel 7")}, {"operator", std::string("Jo")}, {"room_temperature_C", 21.5}};
   run.session.notes = {{"2026-11-23T14:00:00Z", "Ann", "a bubble"}};
@@ -64,7 +66,10 @@ TEST(RoCrate, IsFlatLinkedAndSaysWhatTheFilesHold) {
   EXPECT_EQ(entities["#acquisition-gel.run.h5"]["agent"]["@id"], "#person-Jo");
   EXPECT_EQ(entities["#note-gel.run.h5-1"]["author"]["@id"], "#person-Ann");
   EXPECT_EQ(entities["#rig-gel.run.h5-room_temperature_C"]["value"], 21.5);
+  EXPECT_EQ(entities["#rig-gel.run.h5-room_temperature_C"]["unitText"], "degC");
   EXPECT_EQ(entities["#rig-gel.run.h5-hose_length_m"]["unitText"], "m");
+  EXPECT_EQ(entities["#rig-gel.run.h5-fluid_density_kg_m3"]["unitText"], "kg/m3");
+  EXPECT_FALSE(entities["#rig-gel.run.h5-hose_creep_fraction"].contains("unitText"));
   EXPECT_EQ(entities["dicom/"]["@type"], "Dataset");
 }
 
