@@ -20,9 +20,7 @@ MOST_POINTS = 1200
 
 
 def number(value: Any) -> str:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return "" if value is None else str(value)
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return "" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
@@ -111,11 +109,8 @@ def of_comparison(found: results.Comparison) -> str:
 
 def of(record: Any) -> str:
     """Records without a picture of their own are a table of their plain members."""
-    if isinstance(record, results.Fit):
-        return of_fit(record)
-    if isinstance(record, results.Explanation):
-        return of_explanation(record)
-    if isinstance(record, results.Comparison):
-        return of_comparison(record)
+    own: dict[type, Any] = {results.Fit: of_fit, results.Explanation: of_explanation, results.Comparison: of_comparison}
+    if type(record) in own:
+        return str(own[type(record)](record))
     plain = [(f.name, getattr(record, f.name)) for f in dataclasses.fields(record)]
     return f"<b>{type(record).__name__}</b>" + table(("", ""), [(n, v) for n, v in plain if not isinstance(v, (list, dict, Record))])

@@ -32,8 +32,7 @@ class Sample:
 
 def default_socket() -> str:
     """The user's own daemon, else the system's service."""
-    runtime = os.environ.get("XDG_RUNTIME_DIR")
-    if runtime:
+    if runtime := os.environ.get("XDG_RUNTIME_DIR"):
         own = f"{runtime}/diastole.sock"
     elif os.geteuid() == 0:
         own = "/run/diastole.sock"

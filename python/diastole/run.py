@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pathlib
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Any, Union
 
@@ -30,7 +31,7 @@ class Run:
 
     def __init__(self, path: Path) -> None:
         self.path = pathlib.Path(path)
-        with RunFile(self.path) as file:
+        with closing(RunFile(self.path)) as file:
             if (root := file.attributes("/")).get("format") != "diastole-run" or root.get("format_version") != 1:
                 raise ValueError(f"{self.path}: is no run file of Diastole, or one of another version (format_version) than 1")
             required = (str(root[name]) if name in root else file.refuse(f"attribute {name}", "is missing") for name in ("run_id", "started_utc", "producer"))
@@ -44,8 +45,8 @@ class Run:
             self.channels = [name for name in file.names("pressure") if name.endswith("_kPa")]
 
     def column(self, dataset: str) -> Column:
-        """Any dataset of numbers, by its path: "pump/commanded_mL"."""
-        with RunFile(self.path) as file:
+        """Any dataset of numbers, by its path: "pump/commanded_mL"; KeyError if there is none."""
+        with closing(RunFile(self.path)) as file:
             return file.numbers(dataset)
 
     @property

@@ -20,12 +20,16 @@ NUMBERS, TEXTS = (h5py.h5t.INTEGER, h5py.h5t.FLOAT), (h5py.h5t.STRING,)
 
 
 class RunFile:
-    """Raises OSError for what is no HDF5 file; every method raises ValueError with file, place and reason."""
+    """Raises OSError for what is no HDF5 file; every method raises ValueError with file, place and reason, but KeyError for what may be absent."""
 
     def __init__(self, path: pathlib.Path) -> None:
         self.path = path
-        self._file = h5py.File(path, "r")
+        try:
+            self._file = h5py.File(path, "r")
+        except OSError as error:
+            raise type(error)(f"{path}: {error}") from error
         self._bytes = self._text_bytes_left = path.stat().st_size
+        self._datasets: list[str] = []
         try:
             self._expect_own_links()
             self._file.visititems(lambda name, found: self._expect_own_values(name, found) if isinstance(found, h5py.Dataset) else None)
@@ -33,14 +37,13 @@ class RunFile:
             self._file.close()
             raise
 
-    def __enter__(self) -> RunFile:
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
         self._file.close()
 
     def numbers(self, path: str) -> Column:
         """Of a recording's streams, or of triggers and the like, which are fewer."""
+        if not isinstance(self._file.get(path), h5py.Dataset):
+            raise KeyError(f"{self.path}: has no dataset {path}, but {', '.join(self._datasets)}")
         data = self._dataset(path, NUMBERS, "numbers")
         return np.asarray(data[: self._rows(data)], dtype=np.float64)
 
@@ -111,6 +114,7 @@ class RunFile:
     def _expect_own_values(self, name: str, data: Any) -> None:
         """They lie in this file, are no more than its bytes can hold, and are unpacked by the library itself."""
         made, place = data.id.get_create_plist(), f"dataset /{name}"
+        self._datasets.append(name)
         layout, filters = made.get_layout(), [made.get_filter(i)[0] for i in range(made.get_nfilters())]
         if layout == h5py.h5d.VIRTUAL or made.get_external_count() > 0:
             self.refuse(place, "takes its values from another file, which no run file's does")

@@ -36,6 +36,19 @@ cycles = 4
 """
 
 
+def least_document(schema):
+    """The smallest that a schema allows."""
+    if "anyOf" in schema:
+        return least_document(schema["anyOf"][0])
+    if "enum" in schema:
+        return schema["enum"][0]
+    kinds = schema.get("type", "null")
+    kind = kinds[0] if isinstance(kinds, list) else kinds
+    if kind == "object":
+        return {key: least_document(schema["properties"][key]) for key in schema.get("required", ())}
+    return {"array": [], "boolean": False, "integer": 0, "number": 0.0, "string": "", "null": None}[kind]
+
+
 class InAFolder(unittest.TestCase):
     def setUp(self):
         self.work = tempfile.TemporaryDirectory()
@@ -68,12 +81,22 @@ class Runs(InAFolder):
         self.assertIn("<svg", same._repr_html_())
 
     def test_what_is_no_run_is_refused(self):
-        with self.assertRaises(OSError):
+        with self.assertRaisesRegex(OSError, r"e\.toml: "):
             diastole.Run(self.folder / "e.toml")
+        with self.assertRaisesRegex(FileNotFoundError, r"missing\.run\.h5: "):
+            diastole.Run(self.folder / "missing.run.h5")
         with self.assertRaises(diastole.DiastoleError) as refused:
             diastole.simulate(self.folder / "missing.toml", self.folder / "a.run.h5")
         self.assertEqual(refused.exception.code, 2)
         self.assertIn("missing.toml", str(refused.exception))
+
+
+    def test_a_dataset_that_is_not_there_is_named_with_those_that_are(self):
+        run = diastole.simulate(self.folder / "e.toml", self.folder / "a.run.h5")
+        for absent in ("nope", "pressure/pump_kPa", "pressure"):
+            with self.assertRaisesRegex(KeyError, rf"a\.run\.h5: has no dataset {absent}, but .*pressure/cavity_kPa"):
+                run.column(absent)
+        self.assertEqual(len(run.column("/trigger/time_s")), 4)
 
 
 class HostileFiles(InAFolder):
@@ -145,6 +168,25 @@ class Studies(InAFolder):
         self.assertIn("C1_kPa", fit._repr_html_())
         self.assertIn("neo-hookean", study._repr_html_())
 
+    def test_tags_are_followed_in_the_images_of_the_study(self):
+        tracking = diastole.Study(source / "examples/tagged-gel/tagged-gel.study.toml").track(self.folder / "gel.tags.csv")
+        self.assertGreater(tracking.points, 1000)
+        self.assertTrue((self.folder / "gel.tags.csv").is_file())
+        with self.assertRaisesRegex(ValueError, "names no folder"):
+            diastole.Study(source / "examples/phantom-a-points.study.toml").track(self.folder / "none.tags.csv")
+
+    def test_an_explanation_is_read_from_what_the_program_prints(self):
+        answer = least_document(json.loads((source / "docs/schema/explain.schema.json").read_text()))
+        answer.update(verdict="explained", summary="a bubble & more")
+        stored = self.folder / "diastole"
+        stored.write_text(f"#!/bin/sh\necho \"$@\" > {self.folder}/said\ncat <<'END'\n{json.dumps(answer)}\nEND\nexit 1\n")
+        stored.chmod(0o755)
+        with unittest.mock.patch.dict(os.environ, DIASTOLE=str(stored)):
+            found = diastole.Study(source / "examples/phantom-a-points.study.toml").explain(self.folder / "out", seed=7)
+        self.assertEqual((self.folder / "said").read_text().split()[2:], ["-o", str(self.folder / "out"), "--seed", "7", "--json"])
+        self.assertEqual((found.verdict, found.effects), ("explained", []))
+        self.assertIn("a bubble &amp; more", found._repr_html_())
+
     def test_documents_of_another_form_are_refused_with_their_place(self):
         with self.assertRaisesRegex(TypeError, r"Fit\.parameters\.C1_kPa\.value"):
             plain = {"str": "", "int": 1, "float": 1.0, "bool": True}
@@ -201,6 +243,20 @@ class AtARig(InAFolder):
                 rig.run(self.folder / "e.toml", self.folder / "again.run.h5")
             with self.assertRaises(diastole.DiastoleError):
                 rig.call("run.start", experiment="nonsense", file="x")
+
+    def test_a_run_is_stopped(self):
+        (self.folder / "long.toml").write_text(EXPERIMENT.replace("cycles = 4", "cycles = 5000"))
+        with diastole.Rig(self.folder / "socket") as rig:
+            rig.home()
+            self.assertFalse(rig.stop())
+            rig.start(self.folder / "long.toml")
+            while not rig.progress()["triggers"]:
+                time.sleep(0.01)
+            self.assertTrue(rig.stop(at_cycle_end=True))
+            for _ in rig.live(interval_s=0.01):
+                pass
+            run = diastole.Run(rig.progress()["result"]["run_file"])
+        self.assertLess(len(run.trigger_s), 5000)
 
     def test_nobody_listens(self):
         with self.assertRaises(diastole.DiastoleError) as refused:
