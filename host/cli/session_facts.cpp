@@ -8,7 +8,9 @@
 #include <optional>
 #include <vector>
 
+#include "protocol/contract/command.hpp"
 #include "protocol/contract/named_members.hpp"
+#include "protocol/contract/plain_text.hpp"
 #include "protocol/contract/text.hpp"
 #include "protocol/runfile/layout.hpp"
 
@@ -18,14 +20,17 @@ namespace {
 /// Of rooms in which people work.
 constexpr double coldest_C = -10, warmest_C = 60;
 
-/// None if nobody answers any more.
+/// None if nobody answers any more; asks again for what is not plain.
 std::optional<std::string> answer_to(const std::string& question, std::istream& answers,
                                      std::FILE* questions) {
-  fmt::print(questions, "{}: ", question);
-  std::fflush(questions);
-  std::string answer;
-  if (!std::getline(answers, answer)) return std::nullopt;
-  return std::string(trimmed(answer));
+  for (std::string answer;;) {
+    fmt::print(questions, "{}: ", question);
+    std::fflush(questions);
+    if (!std::getline(answers, answer)) return std::nullopt;
+    const std::string why = why_not_plain(trimmed(answer));
+    if (why.empty()) return std::string(trimmed(answer));
+    fmt::print(questions, "  it {}\n", why);
+  }
 }
 
 void ask_for_temperature(std::optional<double>& temperature_C, std::istream& answers, std::FILE* questions) {
@@ -44,11 +49,14 @@ void ask_for_temperature(std::optional<double>& temperature_C, std::istream& ans
 }  // namespace
 
 void add_facts_to(CLI::App& command, SessionFacts& facts) {
-  command.add_option("--specimen", facts.specimen, "name of the specimen, kept in the run file");
-  command.add_option("--operator", facts.operator_name, "who does the session");
+  constexpr auto plain = [](const std::string& text) { return why_not_plain(text); };
+  command.add_option("--specimen", facts.specimen, "name of the specimen, kept in the run file")
+      ->check(plain, "");
+  command.add_option("--operator", facts.operator_name, "who does the session")->check(plain, "");
   command.add_option("--room-temperature-C", facts.room_temperature_C, "temperature of the room")
       ->check(number_between(coldest_C, warmest_C));
-  command.add_option("--note", facts.notes, "a remark; may be repeated, and `diastole note` adds more later");
+  command.add_option("--note", facts.notes, "a remark; may be repeated, and `diastole note` adds more later")
+      ->check(plain, "");
 }
 
 std::string own_user_name() {
@@ -90,7 +98,7 @@ std::string session_words(const runfile::Session& session) {
   for (const runfile::SessionNote& note : session.notes)
     words += fmt::format("  note of {}{}{}: {}\n", note.written_utc, note.author.empty() ? "" : " by ",
                          note.author, note.text);
-  return words;
+  return made_plain(words);
 }
 
 }  // namespace diastole

@@ -9,6 +9,7 @@
 #include "host/rpc/json_rpc.hpp"
 #include "host/rpc/rig_json.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/plain_text.hpp"
 #include "protocol/runfile/layout.hpp"
 
 namespace diastole {
@@ -83,6 +84,8 @@ std::string short_text(const json& value, const std::string& name) {
     throw rpc::Error(rpc::Code::invalid_params,
                      fmt::format("session: {} must be a text of at most {} bytes", name, most_fact_bytes));
   }
+  if (const std::string why = why_not_plain(value.get_ref<const std::string&>()); !why.empty())
+    throw rpc::Error(rpc::Code::invalid_params, fmt::format("session: {} {}", name, why));
   return value;
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/plain_text.hpp"
 #include "protocol/runfile/amended_file.hpp"
 #include "protocol/runfile/h5_handle.hpp"
 #include "protocol/runfile/layout.hpp"
@@ -55,6 +56,10 @@ std::string note_path(size_t number) { return fmt::format("{}/{:04}", session_no
 void append_note(const std::filesystem::path& run, const SessionNote& note) {
   if (note.text.find_first_not_of(" \t\n") == std::string::npos)
     throw InputError({run.string(), "note", "has no text", "Say what is to be remembered."});
+  for (const auto& [place, text] : {std::pair("note", &note.text), std::pair("author", &note.author)}) {
+    if (const std::string why = why_not_plain(*text); !why.empty())
+      throw InputError({run.string(), place, why, "Write it in UTF-8, without control characters."});
+  }
   (void)open_run(run);
   amend_run(run, fmt::format("group {}", session_notes), [&](hid_t file) { return write_note(file, note); });
 }

@@ -12,7 +12,8 @@ namespace diastole::runfile {
 /// The dataset of the n-th note, from 1: "/session/notes/0001".
 std::string note_path(size_t number);
 
-/// As amend_run (amended_file.hpp). Throws InputError as read_run does, and for a note without text.
+/// As amend_run (amended_file.hpp). Throws InputError as read_run does, for a note without text, and for a text or an author that is not plain
+/// (protocol/contract/plain_text.hpp).
 void append_note(const std::filesystem::path& run, const SessionNote& note);
 
 }  // namespace diastole::runfile

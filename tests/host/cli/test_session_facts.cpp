@@ -53,5 +53,30 @@ TEST(SessionQuestions, ATemperatureThatIsNoneIsAskedForAgain) {
   EXPECT_FALSE(asked({}, "\n\nwarm\n").room_temperature_C) << "the answers end";
 }
 
+TEST(SessionQuestions, WhatSteersATerminalIsAskedForAgain) {
+  std::string questions;
+  EXPECT_EQ(asked({}, "gel\x1b[D7\ngel-7\nJo\n\n\n", &questions).specimen, "gel-7");
+  EXPECT_THAT(questions, HasSubstr("control character 0x1b"));
+}
+
+TEST(SessionOptions, WhatSteersATerminalOrIsNotUtf8IsRefused) {
+  for (const char* option : {"--specimen", "--operator", "--note"}) {
+    for (const char* text : {"red \x1b[31m", "warm\xE4"}) {
+      SessionFacts facts;
+      CLI::App command;
+      add_facts_to(command, facts);
+      EXPECT_THROW(command.parse(std::vector<std::string>{text, option}), CLI::ValidationError) << option;
+    }
+  }
+}
+
+TEST(SessionWords, ShowNothingThatSteersATerminal) {
+  runfile::Session session;
+  session.facts["specimen"] = std::string("gel \x1b[2J");
+  session.notes = {{"2026-11-23T14:00:00Z", "Jo", "red \x1b[31m"}};
+  EXPECT_THAT(session_words(session), testing::Not(HasSubstr("\x1b")));
+  EXPECT_THAT(session_words(session), HasSubstr("by Jo: red"));
+}
+
 }  // namespace
 }  // namespace diastole

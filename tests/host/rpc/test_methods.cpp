@@ -87,5 +87,16 @@ TEST(Methods, NumbersThatNoOrderMayHaveAreRefused) {
   EXPECT_TRUE(is_refused("run.stop", "how", "at once"));
 }
 
+TEST(Methods, FactsOfASessionThatSteerATerminalAreRefused) {
+  for (const json& session : {json{{"specimen", "gel \x1b[2J"}}, json{{"operator", "J\r"}},
+                              json{{"notes", {"warm", "red \x1b[31m"}}}}) {
+    json params = usual_requests().at("run.start");
+    params["session"] = session;
+    const json answer = answer_to(*find_method("run.start"), params);
+    ASSERT_TRUE(answer.contains("error")) << session;
+    EXPECT_THAT(answer["error"]["message"].get<std::string>(), testing::HasSubstr("control character"));
+  }
+}
+
 }  // namespace
 }  // namespace diastole

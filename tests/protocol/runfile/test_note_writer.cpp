@@ -65,6 +65,13 @@ TEST_F(NoteWriter, ANoteOfBlanksAndWhatIsNoRunAreRefused) {
   EXPECT_TRUE(read_session(run).empty());
 }
 
+TEST_F(NoteWriter, WhatSteersATerminalOrIsNotUtf8IsRefused) {
+  EXPECT_THROW(append_note(run, {"", "Jo", "red \x1b[31m"}), InputError);
+  EXPECT_THROW(append_note(run, {"", "Jo", "warm\xE4"}), InputError);
+  EXPECT_THROW(append_note(run, {"", "J\x1b[31m", "warm"}), InputError);
+  EXPECT_TRUE(read_session(run).empty());
+}
+
 TEST_F(NoteWriter, TwoWhoWriteAtTheSameTimeBothAreKept) {
   const auto write = [&](const std::string& author) {
     for (int i = 0; i < 4; ++i)
