@@ -24,11 +24,11 @@ using testing::SizeIs;
 class RunsOfAFolder : public testing::Test {
  protected:
   RunsOfAFolder() {
-    fs::create_directories(scratch / "monday");
     copy_run("monday/a.run.h5");
     copy_run("b.run.h5");
   }
   void copy_run(const std::string& name) {
+    fs::create_directories((scratch / name).parent_path());
     fs::copy_file(test::recorded("rig/case-028/baseline.run.h5"), scratch / name);
     fs::permissions(scratch / name, fs::perms::owner_write, fs::perm_options::add);
   }
@@ -105,6 +105,21 @@ TEST_F(RunsOfAFolder, WhatCannotBeReadStandsThereWithItsProblem) {
   EXPECT_THAT(paths({"kind=images"}), ElementsAre("images"));
   EXPECT_THAT(paths({"kind=explanation"}), ElementsAre("cut/explanation.json"));
   EXPECT_THAT(paths({}), SizeIs(5));
+}
+
+TEST_F(RunsOfAFolder, ACrateIsLeftOutUnlessItIsAskedItself) {
+  copy_run("out/crate/b.run.h5");
+  write("out/crate/ro-crate-metadata.json", "{}");
+  refresh();
+  EXPECT_THAT(paths({}), ElementsAre("b.run.h5", "monday/a.run.h5"));
+  Catalogue of_crate(scratch / "out/crate", ":memory:");
+  of_crate.refresh([](int64_t, int64_t) {});
+  EXPECT_EQ(of_crate.find({condition_of({})}).matched, 1);
+}
+
+TEST_F(RunsOfAFolder, WordsThatStandNowhereAreNamed) {
+  refresh();
+  EXPECT_THAT(catalogue.found_nowhere({"nosuch", "monday", "specimen=gel", "mond*"}), ElementsAre("nosuch"));
 }
 
 TEST_F(RunsOfAFolder, TextsNumbersAndDatesAreFiltered) {

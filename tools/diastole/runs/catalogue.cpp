@@ -76,7 +76,7 @@ struct Folder {
   std::map<std::string, Images> images;
 };
 
-/// Folders whose names begin with a dot, and those that may not be read, are left out.
+/// Folders whose names begin with a dot, those that are crates (ro_crate.hpp): copies, and those that may not be read, are left out.
 Folder look_through(const fs::path& folder) {
   Folder found;
   const size_t skipped = folder.native().size() + 1;
@@ -86,7 +86,9 @@ Folder look_through(const fs::path& folder) {
   for (fs::recursive_directory_iterator each(folder, fs::directory_options::skip_permission_denied), end;
        each != end; ++each) {
     const fs::path& path = each->path();
-    if (path.filename().native().starts_with('.')) {
+    std::error_code ignored;
+    if (path.filename().native().starts_with('.') ||
+        (each->is_directory(ignored) && fs::exists(path / "ro-crate-metadata.json", ignored))) {
       each.disable_recursion_pending();
       continue;
     }
@@ -273,6 +275,14 @@ Refreshed Catalogue::refresh(const Progress& progress) {
   relate();
   database_.execute("commit");
   return refreshed;
+}
+
+std::vector<std::string> Catalogue::found_nowhere(const std::vector<std::string>& words) const {
+  std::vector<std::string> nowhere;
+  for (const std::string& word : words)
+    if (is_word_alone(word) && find({.condition = condition_of({word}), .most = 0}).matched == 0)
+      nowhere.push_back(word);
+  return nowhere;
 }
 
 Found Catalogue::find(const Query& query) const {

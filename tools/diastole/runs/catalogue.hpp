@@ -37,7 +37,7 @@ class Catalogue {
   /// Called now and then with how many of how many changed files were read.
   using Progress = std::function<void(int64_t read, int64_t of)>;
 
-  /// `folder` exists. `index`: the database's file, made anew if it is none of this program's.
+  /// `folder` exists; what lies in a crate below it (host/runfile/ro_crate.hpp) is a copy, and left out. `index`: the database's file, made anew if it is none of this program's.
   Catalogue(std::filesystem::path folder, const std::filesystem::path& index);
 
   /// What was read so far is kept if the program is ended meanwhile.
@@ -45,6 +45,8 @@ class Catalogue {
   /// Begins from nothing with the next refresh.
   void forget();
   [[nodiscard]] Found find(const Query& query) const;
+  /// Those of the words that stand alone, without a key, and in no text of any entry.
+  [[nodiscard]] std::vector<std::string> found_nowhere(const std::vector<std::string>& words) const;
 
  private:
   void prepare();

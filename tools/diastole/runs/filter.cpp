@@ -168,6 +168,8 @@ Condition condition_of(const std::vector<std::string>& words) {
   return condition;
 }
 
+bool is_word_alone(const std::string& word) { return parsed(word).key.empty(); }
+
 const std::vector<std::string>& keys() {
   static const std::vector<std::string> names = [] {
     std::vector<std::string> all;

@@ -21,6 +21,9 @@ struct Condition {
 /// Throws InputError that names the word, and the nearest known key or what a value must be.
 Condition condition_of(const std::vector<std::string>& words);
 
+/// Whether a word names no key, and is looked for in all texts.
+bool is_word_alone(const std::string& word);
+
 /// The columns of `entries` by which may be filtered and sorted.
 const std::vector<std::string>& keys();
 

@@ -13,6 +13,7 @@
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/json_text.hpp"
 #include "protocol/contract/named_members.hpp"
+#include "protocol/contract/plain_text.hpp"
 #include "protocol/contract/table_reader.hpp"
 #include "tools/diastole/commands.hpp"
 #include "tools/diastole/runs/catalogue.hpp"
@@ -85,6 +86,7 @@ void show_table(const std::vector<Entry>& entries) {
     rows.push_back({entry.date.substr(0, 16), entry.kind, entry.specimen, entry.operator_name, entry.protocol,
                     sound_words(entry), entry.verdict + (entry.effects.empty() ? "" : ": " + entry.effects),
                     stiffness_words(entry), entry.path});
+    std::ranges::transform(rows.back(), rows.back().begin(), made_plain);
   }
   std::vector<size_t> widths(rows.front().size(), 0);
   for (const Row& row : rows)
@@ -113,6 +115,18 @@ class ProgressLine {
   std::chrono::steady_clock::time_point next_ = std::chrono::steady_clock::now() + interval;
 };
 
+/// A folder's name that was mistyped, or came second, is a word that stands nowhere.
+ExitCode report_found_nowhere(const std::vector<std::string>& words) {
+  for (const std::string& word : words) {
+    std::error_code ignored;
+    fmt::print(
+        stderr, "diastole: {}: {}, and stands in no text of the files\n  {}\n", made_plain(word),
+        fs::is_directory(word, ignored) ? "is another folder than the one that is searched" : "is no folder",
+        "Give one folder that exists, first, then what to look for.");
+  }
+  return words.empty() ? ExitCode::done : ExitCode::negative;
+}
+
 ExitCode runs(RunsOptions options, const CommandOutput& out) {
   const fs::path folder = fs::canonical(take_folder(options.words));
   const catalogue::Condition condition = catalogue::condition_of(options.words);
@@ -132,6 +146,8 @@ ExitCode runs(RunsOptions options, const CommandOutput& out) {
   int64_t most = options.most;
   if (most < 0 && !options.page.empty()) most = most_on_a_page;
   const Found found = known.find({condition, options.sort, rising, most});
+  const ExitCode code =
+      found.matched > 0 ? ExitCode::done : report_found_nowhere(known.found_nowhere(options.words));
   if (!options.page.empty()) {
     write_whole_file(
         options.page,
@@ -149,35 +165,37 @@ ExitCode runs(RunsOptions options, const CommandOutput& out) {
     for (const Entry& entry : found.entries)
       document["entries"].push_back(entry_json(entry));
     std::cout << json_text(document, 2) << '\n';
-    return ExitCode::done;
+    return code;
   }
   if (!options.page.empty()) {
     fmt::print("{} of {} are on {}\n", found.entries.size(), found.matched, options.page.string());
-    return ExitCode::done;
+    return code;
   }
   if (!found.entries.empty()) show_table(found.entries);
   fmt::print("{} of {} files in {}\n", found.matched, refreshed.files, folder.string());
-  return ExitCode::done;
+  return code;
 }
 
 }  // namespace
 
 void add_runs(CommandLine& line) {
   auto options = std::make_shared<RunsOptions>();
-  CLI::App* command =
-      line.add("runs", "find runs again: a catalogue of a folder's runs, fits, explanations and images",
-               "  diastole runs\n"
-               "      all below this folder, the newest first\n"
-               "  diastole runs ~/sessions specimen=gel-7 since=2026-11 verdict=unexplained\n"
-               "  diastole runs 'stiffness_kPa<9' sound=yes bubble --sort stiffness_kPa\n"
-               "      a word alone may stand in any text: specimen, protocol, notes, problem, ...\n"
-               "  diastole runs kind=run -o runs.html\n"
-               "      a page with a thumbnail of each run's pressure\n"
-               "The index over a folder lies in your cache and is brought up to date by the files' sizes and "
-               "times; it\n"
-               "may be deleted at any time. A run has the verdict and the stiffness of the last explanation "
-               "and fit whose\n"
-               "study names it.");
+  CLI::App* command = line.add(
+      "runs", "find runs again: a catalogue of a folder's runs, fits, explanations and images",
+      "  diastole runs\n"
+      "      all below this folder, the newest first\n"
+      "  diastole runs ~/sessions specimen=gel-7 since=2026-11 verdict=unexplained\n"
+      "  diastole runs 'stiffness_kPa<9' sound=yes bubble --sort stiffness_kPa\n"
+      "      a word alone may stand in any text: specimen, protocol, notes, problem, ...\n"
+      "  diastole runs kind=run -o runs.html\n"
+      "      a page with a thumbnail of each run's pressure\n"
+      "The index over a folder lies in your cache and is brought up to date by the files' sizes and "
+      "times; it\n"
+      "may be deleted at any time. A run has the verdict and the stiffness of the last explanation "
+      "and fit whose\n"
+      "study names it. Crates (diastole export --ro-crate) hold copies: each is a folder to be asked "
+      "by itself.\n"
+      "Exit code 1: a word alone is no folder, and stands nowhere.");
   command->add_option(
       "WORDS", options->words,
       "folder (default: this one), then KEY=VALUE, KEY<NUMBER, KEY>NUMBER, KEY!=VALUE or words");
