@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "estimator/io/whole_file.hpp"
@@ -104,6 +105,15 @@ void NumberTable::parse_row(std::string_view line, size_t line_number) {
                       fmt::format("more than the {} columns that belong there", columns_.size()),
                       fmt::format("Columns are {}.", fmt::join(columns_, ","))});
   }
+}
+
+void NumberTable::expect_measurable() const {
+  constexpr double most = 1e12;
+  const auto found = std::ranges::find_if(values_, [](double value) { return std::abs(value) > most; });
+  if (found == values_.end()) return;
+  const auto at = static_cast<size_t>(found - values_.begin());
+  fail(at / columns_.size(), at % columns_.size(), fmt::format("{} is beyond what was ever measured", *found),
+       "Correct the value, or the unit: the column's name states it.");
 }
 
 int NumberTable::index_at(size_t row, size_t column, int at_most) const {

@@ -27,6 +27,9 @@ class NumberTable {
   [[nodiscard]] size_t rows() const { return values_.size() / columns_.size(); }
   [[nodiscard]] double at(size_t row, size_t column) const { return values_[row * columns_.size() + column]; }
 
+  /// Throws InputError for the first value that no instrument of a laboratory gives in any unit: its square, or a sum of them, may be none.
+  void expect_measurable() const;
+
   /// The whole number at a place; throws InputError if it has a fraction, is negative or exceeds `at_most`.
   [[nodiscard]] int index_at(size_t row, size_t column, int at_most) const;
 

@@ -10,6 +10,7 @@
 #include "estimator/io/whole_file.hpp"
 #include "estimator/shear/shear_test.hpp"
 #include "protocol/contract/angle.hpp"
+#include "protocol/contract/bounded_file.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/text.hpp"
 
@@ -136,6 +137,7 @@ BenchTest of_rotational_shear(std::string_view text, const std::string& file, co
 BenchTest of_table(std::string_view text, const std::string& file, const TestKind& kind) {
   const std::vector<std::string_view> columns = columns_of(kind, text);
   const NumberTable table = NumberTable::from_text(text, file, columns);
+  table.expect_measurable();
   const auto set = std::span(columns).first(kind.controls);
   BenchTest test{file, &kind, columns.back() == fibre_column, {}, {}};
   const size_t end = columns.size() - (test.has_fibre ? 1 : 0);
@@ -166,6 +168,10 @@ BenchTest bench_test_from_text(std::string_view text, const std::string& file) {
   if (text.find_first_not_of(" \t\r\n") == text.npos)
     throw InputError(
         {file, "", "the file is empty", "It must hold a header and three rows or more; see docs/law.md."});
+  if (is_hdf5(text))
+    throw InputError({file, "",
+                      "is an HDF5 file such as a run file, but a table of a bench test is expected here",
+                      "Give its CSV file; see docs/law.md."});
   const TestKind& kind = kind_of(text, file);
   BenchTest test =
       is_shear_test(header_of(text)) ? of_rotational_shear(text, file, kind) : of_table(text, file, kind);

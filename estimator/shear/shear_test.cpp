@@ -104,6 +104,7 @@ ShearTest shear_test_from_text(std::string_view text, const std::string& file) {
   }
   const Form& form = form_of(text, file);
   const NumberTable table = NumberTable::from_text(text, file, form.columns);
+  table.expect_measurable();
   ShearTest test = {file, std::string(form.load), {}};
   for (size_t row = 0; row < table.rows(); ++row)
     test.rows.push_back(row_of(table, row, form));

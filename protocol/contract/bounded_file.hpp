@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 namespace diastole {
 
@@ -19,5 +20,8 @@ inline constexpr uint64_t most_data_bytes = 512 * megabyte;
 /// which is found before memory is taken.
 std::string read_bounded_file(const std::filesystem::path& path, uint64_t most_bytes,
                               const std::string& remedy = "Check the path and that you may read the file.");
+
+/// Whether a file is HDF5, as run files are, by its first bytes.
+inline bool is_hdf5(std::string_view content) { return content.starts_with("\x89HDF"); }
 
 }  // namespace diastole

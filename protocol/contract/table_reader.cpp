@@ -92,21 +92,20 @@ TableReader::TableReader(std::shared_ptr<const toml::table> document, const toml
     : document_(std::move(document)), table_(table), file_(std::move(file)), path_(std::move(path)) {}
 
 TableReader TableReader::from_file(const std::filesystem::path& path) {
-  const std::string text = read_bounded_file(path, most_settings_bytes);
-  if (text.starts_with("\x89HDF")) {
+  return from_text(read_bounded_file(path, most_settings_bytes), path.string());
+}
+
+TableReader TableReader::from_text(std::string_view text, std::string name) {
+  if (is_hdf5(text)) {
     throw InputError(
-        {path.string(), "", "is an HDF5 file such as a run file, but a TOML file is expected here",
+        {std::move(name), "", "is an HDF5 file such as a run file, but a TOML file is expected here",
          "Give the TOML file that belongs here; a study (NAME.study.toml) names its run files under "
          "[data] runs."});
   }
   if (text.starts_with("{")) {
-    throw InputError({path.string(), "", "is JSON, but a TOML file is expected here",
+    throw InputError({std::move(name), "", "is JSON, but a TOML file is expected here",
                       "Give the TOML file that belongs here, such as a study (NAME.study.toml)."});
   }
-  return from_text(text, path.string());
-}
-
-TableReader TableReader::from_text(std::string_view text, std::string name) {
   try {
     auto document = std::make_shared<toml::table>(toml::parse(text));
     const toml::table* root = document.get();

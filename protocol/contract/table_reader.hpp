@@ -50,7 +50,7 @@ class TableReader {
   /// Parses a file. Throws InputError if it is missing, unreadable or not TOML (with line and column).
   static TableReader from_file(const std::filesystem::path& path);
   /// Parses text that came from elsewhere (a run file's /protocol/toml); `name` stands for the file in
-  /// messages.
+  /// messages. What is HDF5 or JSON is refused as that.
   static TableReader from_text(std::string_view text, std::string name);
 
   /// Demands `format = "name"` and `version = newest` or older (>= 1); returns the version found.

@@ -48,6 +48,13 @@ TEST(BenchTest, ReadsTheFileOfTheShearCommand) {
 
 TEST(BenchTest, RefusesWithPlaceValueAndRemedy) {
   EXPECT_THAT(refused(""), HasSubstr("empty"));
+  EXPECT_THAT(refused("\x89HDF\r\n\x1a\n"), AllOf(HasSubstr("data.csv: is an HDF5 file"), HasSubstr("CSV")));
+  EXPECT_THAT(
+      refused("stretch,nominal_kPa\n1.1,2\n1.2,-1e301\n1.3,4\n"),
+      AllOf(HasSubstr("data.csv: line 3, column nominal_kPa: -1e+301"), HasSubstr("Correct the value")));
+  EXPECT_THAT(refused("inner_radius_mm,outer_radius_mm,height_mm,moment_Nmm,radius_mm,rotation_deg\n"
+                      "8,19,24,1e301,12,3\n8,19,24,2,12,3\n8,19,24,3,12,3\n"),
+              HasSubstr("line 2, column moment_Nmm: 1e+301"));
   EXPECT_THAT(refused("strain,stress\n1,2\n"),
               AllOf(HasSubstr("data.csv: line 1"), HasSubstr("\"strain\""),
                     HasSubstr("stretch_1,stretch_2,nominal_1_kPa,nominal_2_kPa")));

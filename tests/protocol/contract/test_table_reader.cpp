@@ -113,6 +113,7 @@ TEST(TableReader, ARunFileInPlaceOfAStudyIsTold) {
   std::ofstream(file, std::ios::binary) << "\x89HDF\r\n\x1a\n";
   EXPECT_THAT(message_of([&] { (void)TableReader::from_file(file); }),
               AllOf(HasSubstr("HDF5"), HasSubstr("NAME.study.toml")));
+  EXPECT_THAT(message_of([] { (void)reader("\x89HDF\r\n\x1a\n"); }), HasSubstr("is an HDF5 file"));
   std::filesystem::remove(file);
 }
 
