@@ -1,5 +1,6 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -9,6 +10,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <set>
 
 #include "host/cli/daemon_question.hpp"
@@ -19,6 +21,7 @@
 #include "host/runfile/ro_crate.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/json_text.hpp"
+#include "protocol/contract/table_reader.hpp"
 #include "protocol/contract/waiting_line.hpp"
 #include "protocol/runfile/reader.hpp"
 
@@ -57,12 +60,51 @@ std::string task_of(const fs::path& run) {
   return task.empty() ? "run" : task;
 }
 
-void make_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (!fs::is_directory(folder, error) || ::access(folder.c_str(), W_OK | X_OK) != 0)
+/// A folder to export into, or none if it is not named. Unless it is kept, what was made of it goes again with all that is in it.
+class ExportFolder {
+ public:
+  explicit ExportFolder(const fs::path& folder) {
+    if (folder.empty()) return;
+    std::error_code error;
+    const auto is_missing = [&](const fs::path& path) {
+      return fs::status(path, error).type() == fs::file_type::not_found;
+    };
+    for (fs::path each = fs::absolute(folder); is_missing(each); each = each.parent_path())
+      made_ = each;
+    fs::create_directories(folder, error);
+    if (fs::is_directory(folder, error) && ::access(folder.c_str(), W_OK | X_OK) == 0) return;
+    remove();
     throw InputError({folder.string(), "", "is no folder that can be written into",
                       "Name another folder, or one that can be made."});
+  }
+  ~ExportFolder() { remove(); }
+  ExportFolder(const ExportFolder&) = delete;
+  ExportFolder& operator=(const ExportFolder&) = delete;
+
+  void keep() { made_.clear(); }
+
+ private:
+  void remove() {
+    std::error_code ignored;
+    if (!made_.empty()) fs::remove_all(made_, ignored);
+  }
+  fs::path made_;  ///< the uppermost that was not there
+};
+
+/// The address of a licence that is named by its address or as https://spdx.org/licenses names it.
+std::string license_address(const std::string& text) {
+  static const std::vector<std::string> spdx{
+      "CC0-1.0",  "CC-BY-4.0",  "CC-BY-SA-4.0", "CC-BY-NC-4.0", "CC-BY-NC-SA-4.0",
+      "ODbL-1.0", "ODC-By-1.0", "PDDL-1.0",     "MIT",          "Apache-2.0"};
+  static const std::regex address(R"(https://[A-Za-z0-9.-]+\.[A-Za-z]+(:\d+)?(/[!-~]*)?)");
+  if (std::ranges::count(spdx, text) > 0) return "https://spdx.org/licenses/" + text;
+  if (text.size() > 2000 || !std::regex_match(text, address)) {
+    throw InputError({"", "--license",
+                      fmt::format("\"{}\" is neither an https address nor a known licence", text),
+                      fmt::format("{}Give an address as https://spdx.org/licenses/CC-BY-4.0, or one of {}.",
+                                  did_you_mean(text, spdx), fmt::join(spdx, ", "))});
+  }
+  return text;
 }
 
 /// One run's table and description.
@@ -147,7 +189,7 @@ fs::path write_crate(const ExportOptions& options, const std::vector<runfile::Ru
               .published_utc = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))),
               .runs = {},
               .others = {}};
-  if (!options.license.empty()) crate.license = options.license;
+  if (!options.license.empty()) crate.license = license_address(options.license);
   for (size_t i = 0; i < runs.size(); ++i) {
     const fs::path& file = options.runs[i];
     crate.runs.push_back({file.filename().string(), file.stem().stem().string() + ".experiment.toml",
@@ -178,6 +220,7 @@ ExitCode export_runs(const ExportOptions& options, const CommandOutput& out) {
   if (options.runs.size() > 1 && !options.task.empty())
     throw InputError(
         {"", "--task", "is one label for several runs", "Leave it out: each run gets its file's name."});
+  if (!options.license.empty()) (void)license_address(options.license);
   std::vector<runfile::RunFile> runs;
   for (const fs::path& file : options.runs) {
     const WaitingLine waiting("reading " + file.string());
@@ -186,8 +229,7 @@ ExitCode export_runs(const ExportOptions& options, const CommandOutput& out) {
   std::vector<BidsFiles> files;
   if (!options.bids.empty()) files = bids_files(options, runs);
   if (!options.crate.empty()) (void)crated_names(options);
-  for (const fs::path& folder : {options.bids, options.crate})
-    if (!folder.empty()) make_folder(folder);
+  ExportFolder bids(options.bids), crate(options.crate);
   for (const BidsFiles& each : files) {
     require_new_file(each.table, options.force);
     require_new_file(each.description, options.force);
@@ -201,6 +243,8 @@ ExitCode export_runs(const ExportOptions& options, const CommandOutput& out) {
     throw HardwareError(options.crate.string(), error.what(),
                         "Check the space on the disk and that you may write there.");
   }
+  bids.keep();
+  crate.keep();
   // A single run's table, as it was printed before there were crates.
   if (files.size() == 1) document.update(document["bids"].front());
   print(out, document, [&] {
@@ -230,7 +274,8 @@ void add_export(CommandLine& line) {
   command->add_option("--ro-crate", options->crate, "directory of the crate; made if absent");
   command->add_option("--also", options->also,
                       "a file or folder that goes into the crate, too; may be repeated");
-  command->add_option("--license", options->license, "address of the crate's licence, as an SPDX page");
+  command->add_option("--license", options->license,
+                      "the crate's licence: an https address, or a name of SPDX as CC-BY-4.0");
   command->add_flag("--force", options->force, "replace files that exist");
   line.on_run(command, [options](const CommandOutput& out) { return export_runs(*options, out); });
 }

@@ -105,6 +105,37 @@ std::vector<BadInput> table() {
        },
        2,
        {"notes.txt", "is no folder"}},
+      {"ALicenceThatIsNone",
+       [](Place place) -> std::vector<std::string> {
+         return {"diastole",  "export", recording(place, "gel.run.h5"), "--ro-crate", "crate",
+                 "--license", "CC-BY-4"};
+       },
+       2,
+       {"--license", "\"CC-BY-4\"", "https", "Did you mean \"CC-BY-4.0\"?"}},
+      {"ANoteThatSteersTheTerminal",
+       [](Place place) -> std::vector<std::string> {
+         return {"diastole", "note", recording(place, "gel.run.h5"), "red \x1b[31m"};
+       },
+       2,
+       {"gel.run.h5", "note", "control character 0x1b", "UTF-8"}},
+      {"ANoteThatIsNotUtf8",
+       [](Place place) -> std::vector<std::string> {
+         return {"diastole", "note", recording(place, "gel.run.h5"), "warm\xE4"};
+       },
+       2,
+       {"gel.run.h5", "note", "is not UTF-8 at byte 4"}},
+      {"ARecordingForAnExperiment",
+       [](Place place) -> std::vector<std::string> {
+         return {"diastole", "run", recording(place, "gel.run.h5"), "-o", "out.run.h5"};
+       },
+       2,
+       {"gel.run.h5", "is an HDF5 file"}},
+      {"ARecordingForABenchTest",
+       [](Place place) -> std::vector<std::string> {
+         return {"diastole", "law", recording(place, "gel.run.h5")};
+       },
+       2,
+       {"gel.run.h5", "is an HDF5 file", "CSV"}},
       {"APageInPlaceOfARecording",
        [](Place place) -> std::vector<std::string> {
          return {"diastole", "runs", ".", "-o", recording(place, "gel.run.h5"), "--force"};
@@ -471,6 +502,21 @@ TEST(MissingArgument, IsToldWithWhatItIsFor) {
   EXPECT_THAT(reported({"diastole", "fit"}), HasSubstr("STUDY is missing: study file"));
   EXPECT_THAT(reported({"diastole", "mesh"}), HasSubstr("one of its commands is missing: import, export"));
   EXPECT_THAT(reported({"diastole", "--json"}), HasSubstr("a command is missing"));
+}
+
+TEST(MistypedFolder, IsNamedAsAWordThatStandsNowhere) {
+  const Workplace place;
+  (void)recording(place, "gel.run.h5");
+  std::filesystem::create_directory(place / "empty");
+  std::filesystem::create_directory(place / "other");
+  const Ended mistyped = run(place, {"diastole", "runs", "nosuch"});
+  EXPECT_EQ(mistyped.exit_code, 1);
+  EXPECT_THAT(mistyped.err, HasSubstr("nosuch: is no folder"));
+  const Ended second = run(place, {"diastole", "runs", "empty", "other", "--json"});
+  EXPECT_EQ(second.exit_code, 1);
+  EXPECT_EQ(second.json().at("matched"), 0);
+  EXPECT_THAT(second.err, HasSubstr("other: is another folder"));
+  EXPECT_EQ(run(place, {"diastole", "runs", "kind=fit"}).exit_code, 0);
 }
 
 TEST(BadMeshFile, IsToldWithoutTalkOfStudies) {

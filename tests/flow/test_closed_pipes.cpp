@@ -45,5 +45,17 @@ TEST(FullDisk, AnAnswerThatWasNotWrittenIsAnError) {
   }
 }
 
+TEST(FullDisk, AnExportThatDoesNotFitLeavesNoFolder) {
+  const Workplace place;
+  place.write("baseline.run.h5", source_text("examples/recorded-baseline.run.h5"));
+  for (const char* into : {"--ro-crate new/crate", "--bids new/bids --ro-crate new/crate"}) {
+    const Ended ended =
+        run_line(place, std::string("trap '' XFSZ; ulimit -f 1; diastole export baseline.run.h5 ") + into);
+    EXPECT_EQ(ended.exit_code, 3);
+    EXPECT_THAT(ended.err, HasSubstr("new/"));
+    EXPECT_FALSE(std::filesystem::exists(place / "new"));
+  }
+}
+
 }  // namespace
 }  // namespace diastole::flow
