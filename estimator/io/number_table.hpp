@@ -27,7 +27,7 @@ class NumberTable {
   [[nodiscard]] size_t rows() const { return values_.size() / columns_.size(); }
   [[nodiscard]] double at(size_t row, size_t column) const { return values_[row * columns_.size() + column]; }
 
-  /// Throws InputError for the first value that no instrument of a laboratory gives in any unit: its square, or a sum of them, may be none.
+  /// Throws InputError for the first value beyond 1e12, which no instrument gives in any unit; sums of squares of larger ones may overflow.
   void expect_measurable() const;
 
   /// The whole number at a place; throws InputError if it has a fraction, is negative or exceeds `at_most`.

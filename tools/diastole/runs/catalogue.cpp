@@ -76,7 +76,7 @@ struct Folder {
   std::map<std::string, Images> images;
 };
 
-/// Folders whose names begin with a dot, those that are crates (ro_crate.hpp): copies, and those that may not be read, are left out.
+/// Folders whose names begin with a dot, crates (ro_crate.hpp), which hold copies, and those that may not be read, are left out.
 Folder look_through(const fs::path& folder) {
   Folder found;
   const size_t skipped = folder.native().size() + 1;

@@ -37,7 +37,8 @@ class Catalogue {
   /// Called now and then with how many of how many changed files were read.
   using Progress = std::function<void(int64_t read, int64_t of)>;
 
-  /// `folder` exists; what lies in a crate below it (host/runfile/ro_crate.hpp) is a copy, and left out. `index`: the database's file, made anew if it is none of this program's.
+  /// `folder` exists; what lies in a crate below it (host/runfile/ro_crate.hpp) is a copy, and left out. `index`: the database's
+  /// file, made anew if it is none of this program's.
   Catalogue(std::filesystem::path folder, const std::filesystem::path& index);
 
   /// What was read so far is kept if the program is ended meanwhile.
