@@ -17,17 +17,15 @@ constexpr double closure = 1e-4;  // of the range
 /// The rows of the table with the lines they stand in.
 class PointsReader {
  public:
-  PointsReader(std::string_view text, const std::string& file, PointsOf of) : file_(file), of_(of) {
-    if (text.size() > most_bytes) {
-      fail(1, fmt::format("has {} bytes, and at most {} are taken", text.size(), most_bytes),
-           "Give fewer points: the controller holds 4096.");
-    }
+  PointsReader(std::string_view text, const std::string& file, PointsOf of)
+      : file_(file), of_(of), bytes_(text.size()) {
     constexpr std::string_view byte_order_mark = "\xef\xbb\xbf";  // spreadsheets put it before UTF-8
     if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
     size_t line = 0;
     while (!text.empty()) {
       const size_t end = std::min(text.find('\n'), text.size());
-      take_line(++line, trimmed(text.substr(0, std::min(end, text.find('#')))));
+      const std::string_view row = text.substr(0, end);
+      take_line(++line, trimmed(row.substr(0, row.find('#'))));
       text.remove_prefix(std::min(end + 1, text.size()));
     }
     if (first_name.empty()) fail(1, "is empty", "The first line names the columns: phase,fraction.");
@@ -50,7 +48,8 @@ class PointsReader {
     if (row.empty()) return;
     const size_t comma = row.find(',');
     if (comma == std::string_view::npos || row.find(',', comma + 1) != std::string_view::npos) {
-      fail(line, fmt::format("\"{}\" is not two columns", row), "Separate two columns with one comma.");
+      fail(line, shown(row) + " is not two columns",
+           first_name.empty() ? names_remedy() : "Separate two columns with one comma.");
     }
     const std::string_view left = trimmed(row.substr(0, comma)), right = trimmed(row.substr(comma + 1));
     if (first_name.empty()) return take_names(line, left, right);
@@ -62,12 +61,23 @@ class PointsReader {
     const bool pressure = of_ == PointsOf::volume_or_pressure;
     if ((left != "phase" && left != "time_s") ||
         (right != "fraction" && right != "volume_mL" && !(pressure && right == "pressure_kPa"))) {
-      fail(line, fmt::format("names the columns \"{}\" and \"{}\"", left, right),
-           fmt::format("The first is phase or time_s, the second fraction{} or {}.",
-                       pressure ? ", volume_mL" : "", pressure ? "pressure_kPa" : "volume_mL"));
+      fail(line, fmt::format("names the columns {} and {}", shown(left), shown(right)), names_remedy());
+    }
+    if (bytes_ > most_bytes) {
+      fail(line, fmt::format("begins points of {} bytes, and at most {} are taken", bytes_, most_bytes),
+           "Give fewer points: the controller holds 4096.");
     }
     first_name = left;
     second_name = right;
+  }
+  static std::string shown(std::string_view text) {
+    constexpr size_t most = 200;
+    return text.size() > most ? fmt::format("a text of {} bytes", text.size()) : fmt::format("\"{}\"", text);
+  }
+  [[nodiscard]] std::string names_remedy() const {
+    const bool pressure = of_ == PointsOf::volume_or_pressure;
+    return fmt::format("The first line names two, with one comma: phase or time_s, and fraction{} or {}.",
+                       pressure ? ", volume_mL" : "", pressure ? "pressure_kPa" : "volume_mL");
   }
   [[nodiscard]] double number(size_t line, std::string_view word) const {
     const auto value = parse_number<double>(word);
@@ -78,6 +88,7 @@ class PointsReader {
 
   const std::string& file_;
   PointsOf of_;
+  size_t bytes_;
 };
 
 /// The first column as phases.
@@ -147,6 +158,7 @@ PointsFile parse_points(std::string_view text, const std::string& file, PointsOf
     rows.fail(rows.lines.back(), fmt::format("fraction goes from {} to {}", least, least + range),
               "The least fraction is 0 and the greatest 1: it is the part of stroke_mL.");
   }
+  points.line = rows.lines;
   if (rows.first_name == "time_s") points.cycle_s = rows.first.back();
   if (rows.second_name == "volume_mL") points.range_mL = range;
   if (rows.second_name == "pressure_kPa") points.range_kPa = range;

@@ -23,6 +23,7 @@ struct PointsFile {
   std::string text;                 ///< as it was read
   std::vector<double> phase;        ///< from 0 to 1
   std::vector<double> fraction;     ///< of the stroke, from 0 to 1 and back to 0
+  std::vector<size_t> line;         ///< of the file, in which each point stands
   std::optional<double> cycle_s;    ///< if the file states times
   std::optional<double> range_mL;   ///< if the file states volumes
   std::optional<double> range_kPa;  ///< if it states pressures

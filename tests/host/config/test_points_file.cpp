@@ -62,6 +62,22 @@ TEST(PointsFile, MistakesAreNamedWithTheirLine) {
   EXPECT_THAT(refusal(head + "0,0\n0.5,0\n1,0\n"), HasSubstr("hold"));
 }
 
+/// A file of other columns "has 912187 bytes: give fewer points".
+TEST(PointsFile, WhatIsNoPointsFileIsRefusedByItsFirstLineHoweverLarge) {
+  const auto refusal = [](const std::string& head) {
+    std::string text = head + "\n";
+    while (text.size() < 1'000'000)
+      text += "0,0.5\n";
+    return message_of<InputError>([&] { parse_points(text, "gel.tags.csv"); });
+  };
+  EXPECT_THAT(refusal("frame,nx,ny"),
+              AllOf(HasSubstr("line 1: \"frame,nx,ny\" is not two columns"), HasSubstr("phase or time_s")));
+  EXPECT_THAT(refusal("x_mm,y_mm"), HasSubstr("line 1: names the columns \"x_mm\" and \"y_mm\""));
+  EXPECT_THAT(refusal("# made elsewhere\nphase,fraction"),
+              AllOf(HasSubstr("line 2: begins points of 1000"), HasSubstr("fewer points")));
+  EXPECT_THAT(refusal(std::string(500'000, 'x')), HasSubstr("a text of 500000 bytes is not two columns"));
+}
+
 TEST(EvenWaveform, EvenPointsAreTheControllersOwn) {
   PointsFile points;
   for (int i = 0; i <= 40; ++i) {
