@@ -72,7 +72,7 @@ TEST(ReplayPlan, TakesSettingsLimitsClocksAndTheStartingPlace) {
   run.rig["calibration_ppm"] = int64_t{500};
   run.rig["lease_ms"] = int64_t{300};
   for (const char* limit : {"limit_travel_mL", "limit_flow_mL_s", "limit_acceleration_mL_s2",
-                            "limit_step_rate_Hz", "limit_pressure_kPa"})
+                            "limit_step_rate_Hz", "limit_pressure_kPa", "limit_cavity_kPa"})
     run.rig[limit] = 77.0;
   run.clock = {{"host_drift_ppm", 12.0}, {"daq_drift_ppm", -30.0}};
   run.pump.commanded_mL.front() = 5.0;
@@ -86,6 +86,7 @@ TEST(ReplayPlan, TakesSettingsLimitsClocksAndTheStartingPlace) {
   const RigConfig rig = rig_of(plan);
   EXPECT_EQ(rig.controller.lease_ms, 300);
   EXPECT_EQ(rig.controller.limits.acceleration_mL_s2, 77);
+  EXPECT_EQ(rig.controller.limits.cavity_kPa, 77);
   EXPECT_TRUE(plan.remarks.empty()) << plan.remarks.front();
 }
 

@@ -54,6 +54,8 @@ MotionLimits limits_of(const RecordedRun& run, ReplayPlan& plan) {
   take("limit_acceleration_mL_s2", limits.acceleration_mL_s2);
   take("limit_step_rate_Hz", limits.step_rate_Hz);
   take("limit_pressure_kPa", limits.pressure_kPa);
+  limits.cavity_kPa =
+      rig_number(run, "limit_cavity_kPa").value_or(limits.cavity_kPa);  // files before it lack it
   if (!complete) {
     plan.remarks.emplace_back(
         "the file does not hold the controller's limits: the usual ones are assumed (--config RIG gives "
@@ -69,9 +71,10 @@ int64_t microsteps_of(const RecordedRun& run) {
 std::string controller_table(const RecordedRun& run, const MotionLimits& limits) {
   return fmt::format(
       "[controller]\nport = \"unused\"\nmicrosteps = {}\nlease_ms = {}\n[controller.limits]\ntravel_mL = {}\n"
-      "flow_mL_s = {}\nacceleration_mL_s2 = {}\nstep_rate_Hz = {}\npressure_kPa = {}\n",
+      "flow_mL_s = {}\nacceleration_mL_s2 = {}\nstep_rate_Hz = {}\npressure_kPa = {}\ncavity_kPa = {}\n",
       microsteps_of(run), std::llround(rig_number(run, "lease_ms").value_or(500)), limits.travel_mL,
-      limits.flow_mL_s, limits.acceleration_mL_s2, limits.step_rate_Hz, limits.pressure_kPa);
+      limits.flow_mL_s, limits.acceleration_mL_s2, limits.step_rate_Hz, limits.pressure_kPa,
+      limits.cavity_kPa);
 }
 
 void plan_settings(const RecordedRun& run, ReplayPlan& plan) {
