@@ -162,6 +162,31 @@ Study SpecimenFamily::on(const std::array<int, 3>& mesh) const {
   return study;
 }
 
+SpecimenReach SpecimenFamily::reach(double volume_mL, double pressure_kPa) const {
+  const std::scoped_lock alone(solving_);
+  const bool is_cylinder = std::holds_alternative<AnnulusSpecimen>(study_.specimen);
+  const Study study = is_cylinder ? on(resolution_.coarse) : study_;
+  ElasticModel model = make_model(study);
+  require_closed_cavity(study, model);
+  const size_t stride = resolution_.stride;
+  const double compared_mL = resolution_.spacing_mL * static_cast<double>(stride);
+  const size_t steps = stride * static_cast<size_t>(std::max(std::ceil(volume_mL / compared_mL), 1.0));
+  SpecimenReach reach{.is_end = true};
+  size_t points = 0;
+  const auto goes_on = [&](const PressureVolumePoint& at) {
+    if (at.stiffness_kPa_per_mL <= 0.0) return false;
+    if (points++ % stride != 0) return true;
+    reach = {.volume_mL = at.volume_change_mL, .pressure_kPa = modulus_kPa_ * at.pressure_kPa};
+    reach.is_end = reach.volume_mL < volume_mL && reach.pressure_kPa < pressure_kPa;  // unless it goes on
+    return reach.is_end;
+  };
+  (void)pressure_volume_curve(model, {.volume_change_mL = resolution_.spacing_mL * static_cast<double>(steps),
+                                      .steps = steps,
+                                      .judge_stability = false,
+                                      .on_point = goes_on});
+  return reach;
+}
+
 SpecimenCurve SpecimenFamily::combined() const {
   if (!std::holds_alternative<AnnulusSpecimen>(study_.specimen)) return computed("own mesh", study_, 1);
   const SpecimenCurve& coarse = computed("coarse", on(resolution_.coarse), 1);

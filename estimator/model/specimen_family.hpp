@@ -38,6 +38,13 @@ struct SpecimenResolution {
   [[nodiscard]] SpecimenResolution reaching(double volume_mL) const;
 };
 
+/// How far a specimen was filled from rest.
+struct SpecimenReach {
+  double volume_mL = 0.0;
+  double pressure_kPa = 0.0;
+  bool is_end = false;  ///< beyond there is no equilibrium, or the pressure rises no further
+};
+
 class SpecimenFamily final : public SpecimenCurves {
  public:
   /// Throws InputError if the study's law or mesh is wrong or the cavity is open.
@@ -48,6 +55,9 @@ class SpecimenFamily final : public SpecimenCurves {
   /// Begins to compute plain() and the low-fidelity neighbours beside other work, so that they are at hand when asked for. One
   /// thread: the other work has the rest. Stopped by the destructor, after the curve at work.
   void compute_ahead();
+  /// To the first of the volumes at which meshes are compared that is no less than `volume_mL` or at which it holds `pressure_kPa`, or to the
+  /// last one before it ends. Of a cylinder on the coarse mesh; not kept.
+  [[nodiscard]] SpecimenReach reach(double volume_mL, double pressure_kPa) const;
   /// The first parameter of the law in kPa: all of the law's moduli are scaled with it.
   [[nodiscard]] double modulus_start_kPa() const { return modulus_kPa_; }
   [[nodiscard]] const StudyParameter& modulus() const;

@@ -7,7 +7,6 @@
 #include <numeric>
 
 #include "estimator/effects/effect.hpp"
-#include "estimator/model/specimen_family.hpp"
 #include "estimator/parallel/parallel_for.hpp"
 #include "estimator/rig/sampled_signal.hpp"
 
@@ -110,7 +109,8 @@ ModelResponse DriveModel::response(const PeriodicCurve& drive_mL, Eigen::Index h
   run.waveform = [&drive](double time_s) { return drive.at(time_s); };
   const rig::PlantTrace trace =
       rig::simulate_plant(model_, run, {.step_s = rig::dividing_step(run, about_step_s), .components = 3});
-  ModelResponse shown{.cavity_mL = mean_cycle(trace.cavity_mL, trace, drive, plan_, harmonics)};
+  ModelResponse shown{.cavity_mL = mean_cycle(trace.cavity_mL, trace, drive, plan_, harmonics),
+                      .greatest_kPa = std::ranges::max(trace.cavity_kPa)};
   const auto ringing =
       static_cast<std::ptrdiff_t>(0.5 * settled_s / trace.step_s);  // mean over the rest's second half
   shown.left_mL = std::accumulate(trace.cavity_mL.end() - ringing, trace.cavity_mL.end(), 0.0) /
@@ -178,6 +178,13 @@ std::vector<LearnableEffect> learnable_effects(const EffectLibrary& library, con
       list.push_back({effect, effect->neutral(base)});
   }
   return list;
+}
+
+rig::SpecimenReach specimen_reach(const Study& study, double volume_mL, double pressure_kPa) {
+  const rig::SpecimenResolution usual;
+  const double solved_mL = usual.spacing_mL * static_cast<double>(usual.points_inflated);
+  if (volume_mL <= solved_mL) return {.volume_mL = solved_mL};
+  return rig::SpecimenFamily(study).reach(volume_mL, pressure_kPa);
 }
 
 DriveModel drive_model_of(const Study& study, double largest_mL, const CyclePlan& plan) {

@@ -9,6 +9,7 @@
 #include "estimator/effects/effect_library.hpp"
 #include "estimator/io/study.hpp"
 #include "estimator/model/session.hpp"
+#include "estimator/model/specimen_family.hpp"
 #include "estimator/rig/simulation.hpp"
 #include "estimator/shaping/periodic_curve.hpp"
 
@@ -22,8 +23,9 @@ struct CyclePlan {
 };
 
 struct ModelResponse {
-  PeriodicCurve cavity_mL;  ///< taken by the specimen since rest
-  double left_mL = 0.0;     ///< in the specimen when the piston is home again; below 0: what has leaked away
+  PeriodicCurve cavity_mL;    ///< taken by the specimen since rest
+  double greatest_kPa = 0.0;  ///< that the specimen holds in the run
+  double left_mL = 0.0;  ///< in the specimen when the piston is home again; below 0: what has leaked away
 };
 
 /// An effect of the plant that runs can teach, with its present values.
@@ -65,6 +67,10 @@ class DriveModel {
 /// The effects of the library that may be learned: of the plant, at no moment, in a specimen that keeps its modulus. At their neutral
 /// values for this rig.
 std::vector<LearnableEffect> learnable_effects(const EffectLibrary& library, const rig::RigModel& base);
+
+/// How far the study's specimen can be filled: to this volume, or to the one at which it holds this pressure (SpecimenFamily::reach). A volume
+/// up to which its curve is solved for in any case is taken as reached; the pressure is 0 then.
+rig::SpecimenReach specimen_reach(const Study& study, double volume_mL, double pressure_kPa);
 
 /// The rig, specimen and effects of a study, for a run after its session, with a specimen's curve that holds up to `largest_mL`.
 /// Throws InputError if the study names no runs, or as read_session.

@@ -224,15 +224,18 @@ Complex catheter_response(const rig::RigModel& model, double frequency_Hz) {
   return second_order * std::polar(1.0, -2.0 * pi * frequency_Hz * model.sample_delay_s);
 }
 
-/// From the mean cycle of the readings; errors through the slope of the specimen's curve.
-MeasuredCurve volume_by_pressure(MeasuredCurve pressure, const DriveModel& model) {
-  const Eigen::Index harmonics = pressure.curve.harmonics();
-  for (Eigen::Index k = 1; k <= harmonics; ++k) {
+MeasuredCurve before_catheter(MeasuredCurve pressure, const DriveModel& model) {
+  for (Eigen::Index k = 1; k <= pressure.curve.harmonics(); ++k) {
     const Complex lag = catheter_response(model.model(), pressure.curve.frequency_Hz(k));
     pressure.curve.c[k] /= lag;
     pressure.sigma[k] /= std::abs(lag);
   }
-  MeasuredCurve volume{specimen_volume(model, pressure.curve, harmonics), pressure.sigma};
+  return pressure;
+}
+
+/// Errors through the slope of the specimen's curve.
+MeasuredCurve volume_by_pressure(const MeasuredCurve& pressure, const DriveModel& model) {
+  MeasuredCurve volume{specimen_volume(model, pressure.curve, pressure.curve.harmonics()), pressure.sigma};
   const double mean_mL = volume.curve.c[0].real();
   volume.sigma /= model.model().modulus_kPa * model.model().curve.at(mean_mL).stiffness_kPa_per_mL;
   return volume;
@@ -274,11 +277,14 @@ GatedRun gated_run(const RecordedRun& run, const DriveModel& model, double perio
   const MeasuredCurve mean = mean_of(pressure, cycles.settling, harmonics);
   if (!std::isfinite(mean.curve.c[0].real()))
     refuse_run(run, "/pressure/cavity_kPa", "holds no whole cycle", "Record the pressure of each run.");
+  const MeasuredCurve cavity = before_catheter(mean, model);
+  const std::vector<double> cavity_kPa = cavity.curve.at_even(static_cast<size_t>(8 * harmonics + 8));
   GatedRun gated{.file = run.file,
                  .drive_mL = drive_of(run, cycles, harmonics),
-                 .cavity_mL = volume_by_pressure(mean, model),
+                 .cavity_mL = volume_by_pressure(cavity, model),
                  .source = "pressure",
                  .zero_kPa = behind.zero_kPa,
+                 .greatest_kPa = std::ranges::max(cavity_kPa),
                  .changed_in_cycle = change_in(pressure, cycles.settling, mean.curve.range())};
   if (const auto flow = run.flow.find(cycles.segment); flow != run.flow.end()) {
     take_flow(run, flow->second, cycles, gated.cavity_mL);

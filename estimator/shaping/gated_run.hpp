@@ -18,8 +18,9 @@ struct GatedRun {
   std::string file;
   PeriodicCurve drive_mL = {};
   MeasuredCurve cavity_mL = {};
-  std::string source;     ///< "gated volume" or "pressure"
-  double zero_kPa = 0.0;  ///< of the transducer: its reading at rest before the motion
+  std::string source;         ///< "gated volume" or "pressure"
+  double zero_kPa = 0.0;      ///< of the transducer: its reading at rest before the motion
+  double greatest_kPa = 0.0;  ///< that the specimen held in the mean cycle
   /// The cycle from which on the specimen's pressure does not go on as the cycles before say: something burst, slipped or opened.
   std::optional<size_t> changed_in_cycle = {};
 };

@@ -50,10 +50,11 @@ Posterior posterior(const std::vector<Complex>& modelled, const std::vector<Comp
 struct Evidence {
   const PeriodicCurve& wanted_mL;
   const std::vector<GatedRun>& runs;
+  double range_mL;
   DriveModel model;                         ///< as the runs have corrected it
   std::vector<PeriodicCurve> from_rest_mL;  ///< drives (drive_from_rest)
   std::vector<PeriodicCurve> modelled_mL;   ///< volumes with them
-  double range_mL;
+  std::vector<double> modelled_kPa;         ///< greatest pressures with them
 
   /// From the first `count` runs.
   [[nodiscard]] std::vector<Posterior> posteriors(size_t count, Eigen::Index harmonics) const {
@@ -82,6 +83,10 @@ struct Evidence {
     const PeriodicCurve& seen = runs[run].cavity_mL.curve;
     return wanted_mL.with(seen.harmonics()).c - seen.c;
   }
+  /// By how much the specimen held more than the model makes of it.
+  [[nodiscard]] double held_beside_kPa(size_t run) const {
+    return std::max(runs[run].greatest_kPa - modelled_kPa[run], 0.0);
+  }
   /// What the run was expected to show, from run `from` and what was learned of the `count` runs before.
   [[nodiscard]] Eigen::VectorXcd expected(size_t run, std::optional<size_t> from, size_t count,
                                           Eigen::Index harmonics) const {
@@ -102,6 +107,7 @@ Iteration iteration_of(const Evidence& evidence, size_t run) {
   const Eigen::VectorXcd error = evidence.error(run);
   it.nrmse = evidence.part(run, error);
   it.level_error_mL = -error[0].real();
+  it.level_sd_mL = gated.cavity_mL.sigma[0];
   it.floor = evidence.part(run, gated.cavity_mL.sigma.cast<Complex>());
   return it;
 }
@@ -248,7 +254,9 @@ void plan_next(const Evidence& evidence, const PeriodicCurve& first_mL, const Bo
   PeriodicCurve next = lesson.drive_mL;
   next.c[0] += beginning_mL;
   const Eigen::Index seen = evidence.runs[*lesson.best].cavity_mL.curve.harmonics();
-  lesson.expected_mL = evidence.model.response(next, seen).cavity_mL;
+  const ModelResponse response = evidence.model.response(next, seen);
+  lesson.greatest_kPa = response.greatest_kPa + evidence.held_beside_kPa(*lesson.best);
+  lesson.expected_mL = response.cavity_mL;
   lesson.expected_mL.c +=
       evidence.runs[*lesson.best].cavity_mL.curve.c - evidence.modelled_mL[*lesson.best].c;
   const double left = evidence.part(
@@ -282,11 +290,14 @@ Lesson learn(const DriveModel& model, const PeriodicCurve& wanted_mL, const Peri
              const std::vector<GatedRun>& runs, const Bound& bound) {
   const Eigen::Index harmonics = first_mL.harmonics();
   Lesson lesson;
-  Evidence evidence{wanted_mL, runs, fitted_model(model, runs, wanted_mL.range()), {}, {}, wanted_mL.range()};
+  const double range_mL = wanted_mL.range();
+  Evidence evidence{wanted_mL, runs, range_mL, fitted_model(model, runs, range_mL), {}, {}, {}};
   for (const GatedRun& run : runs) {
     evidence.from_rest_mL.push_back(drive_from_rest(evidence.model, run, &run == &runs.front()));
-    evidence.modelled_mL.push_back(
-        evidence.model.response(evidence.from_rest_mL.back(), run.cavity_mL.curve.harmonics()).cavity_mL);
+    const ModelResponse modelled =
+        evidence.model.response(evidence.from_rest_mL.back(), run.cavity_mL.curve.harmonics());
+    evidence.modelled_mL.push_back(modelled.cavity_mL);
+    evidence.modelled_kPa.push_back(modelled.greatest_kPa);
   }
   for (const LearnableEffect& one : evidence.model.effects())
     for (size_t i = 0; i < one.values.size(); ++i)
@@ -296,7 +307,9 @@ Lesson learn(const DriveModel& model, const PeriodicCurve& wanted_mL, const Peri
   describe_harmonics(evidence, evidence.posteriors(lesson.iterations.size(), harmonics), lesson);
   if (!lesson.best) {
     lesson.drive_mL = first_mL;
-    lesson.expected_mL = model.response(first_mL, 2 * harmonics).cavity_mL;
+    const ModelResponse expected = model.response(first_mL, 2 * harmonics);
+    lesson.expected_mL = expected.cavity_mL;
+    lesson.greatest_kPa = expected.greatest_kPa;
     return lesson;
   }
   const Iteration& best = lesson.iterations[*lesson.best];
@@ -308,6 +321,7 @@ Lesson learn(const DriveModel& model, const PeriodicCurve& wanted_mL, const Peri
   if (lesson.ending != Ending::none) {
     lesson.drive_mL = best.drive_mL.with(harmonics);
     lesson.expected_mL = best.cavity_mL;
+    lesson.greatest_kPa = evidence.modelled_kPa[*lesson.best] + evidence.held_beside_kPa(*lesson.best);
   }
   return lesson;
 }

@@ -27,6 +27,7 @@ struct Iteration {
   double nrmse = 0.0;           ///< root mean square error about the mean, over the wanted range
   double floor = 0.0;           ///< of it, what noise alone makes
   double level_error_mL = 0.0;  ///< mean volume less the wanted one
+  double level_sd_mL = 0.0;     ///< of that measurement
   double surprise = 0.0;        ///< root mean square of what came less what was expected, over the range;
                                 ///< the model is that of all runs, this one included
   PeriodicCurve drive_mL = {}, cavity_mL = {};
@@ -66,6 +67,7 @@ struct Lesson {
   std::string reason;         ///< why it ended
   PeriodicCurve drive_mL;     ///< the next one, or the best one's if it has ended
   PeriodicCurve expected_mL;  ///< volume with it
+  double greatest_kPa = 0.0;  ///< that the specimen is expected to hold with it
   bool bounded = false;       ///< bounds or the guard against pushing hold it back
   bool guarded = false;       ///< of them the guard
 };
