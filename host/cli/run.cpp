@@ -9,6 +9,7 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
@@ -82,20 +83,30 @@ ExitCode run(RunOptions options, SessionSeries& series, const CommandOutput& out
   if (options.session.output.empty()) {
     throw InputError({"", "-o", "is missing", "Name the run file to write, for example -o session.run.h5."});
   }
-  if (!series.asked())
-    (void)read_experiment(options.session.experiment);  // refuses before the daemon is asked
-  DaemonClient daemon = options.daemon.connect();
-  if (options.asks && isatty(STDIN_FILENO) != 0 && isatty(STDERR_FILENO) != 0)
-    ask_for(options.session.facts, std::cin, stderr);
-  if (!series.asked()) return report_session(acquire(daemon, options.session), out.json);
+  std::optional<DaemonClient> daemon;  // once what is to be run is known to be good
+  const auto connect = [&] {
+    daemon.emplace(options.daemon.connect());
+    if (options.asks && isatty(STDIN_FILENO) != 0 && isatty(STDERR_FILENO) != 0)
+      ask_for(options.session.facts, std::cin, stderr);
+  };
+  if (!series.asked()) {
+    (void)read_experiment(options.session.experiment);
+    connect();
+    return report_session(acquire(*daemon, options.session), out.json);
+  }
+  const SessionSeries::Acquire acquire_next = [&](const std::string& experiment,
+                                                  const std::string& run_file) {
+    options.session.experiment = experiment;
+    options.session.output = run_file;
+    SessionResult result = acquire(*daemon, options.session);
+    if (interrupts > 0 && result.end == "completed") result.end = "stopped by Ctrl-C";
+    return result;
+  };
   return series.carry_out(
       options.session.output, options.session.force,
-      [&](const std::string& experiment, const std::string& run_file) {
-        options.session.experiment = experiment;
-        options.session.output = run_file;
-        SessionResult result = acquire(daemon, options.session);
-        if (interrupts > 0 && result.end == "completed") result.end = "stopped by Ctrl-C";
-        return result;
+      [&] {
+        connect();
+        return acquire_next;
       },
       out);
 }

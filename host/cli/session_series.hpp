@@ -21,8 +21,10 @@ class SessionSeries {
 
   /// Acquires an experiment file into a run file.
   using Acquire = std::function<SessionResult(const std::string& experiment, const std::string& run)>;
-  /// Run files get their number before the ending of `output`. Throws InputError before anything moves.
-  virtual ExitCode carry_out(const std::string& output, bool force, const Acquire& acquire,
+  /// Brings the rig: asked for once, when there is something to run.
+  using Connect = std::function<Acquire()>;
+  /// Run files get their number before the ending of `output`. Throws InputError before the rig is asked for and anything is written.
+  virtual ExitCode carry_out(const std::string& output, bool force, const Connect& connect,
                              const CommandOutput& out) = 0;
 };
 

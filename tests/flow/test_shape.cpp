@@ -104,11 +104,13 @@ TEST(ShapeFlow, RunsThroughTheDaemon) {
     DaemonClient client = rig.client();
     home(client);
   }
-  const Ended ended = run(rig.place, shaped({"diastole", "run", "--shape", wanted, "--iterations", "1", "-o",
+  const Ended ended = run(rig.place, shaped({"diastole", "run", "--shape", wanted, "--iterations", "2", "-o",
                                              "live.run.h5", "--socket", rig.path("socket")}));
   ASSERT_EQ(ended.exit_code, 0) << ended.err;
-  EXPECT_EQ(ended.json().at("iterations").size(), 1U);
-  EXPECT_TRUE(std::filesystem::exists(rig.place / "live.1.run.h5"));
+  const json found = ended.json();
+  ASSERT_EQ(found.at("iterations").size(), 2U);
+  EXPECT_LT(found["iterations"][1].at("nrmse"), found["iterations"][0].at("nrmse"));
+  EXPECT_TRUE(std::filesystem::exists(rig.place / "live.2.run.h5"));
 }
 
 TEST(ShapeFlow, RefusesWhatCannotBe) {
@@ -123,12 +125,43 @@ TEST(ShapeFlow, RefusesWhatCannotBe) {
   const Ended no_study = run(place, {"diastole", "simulate", "--shape", wanted, "-o", "x.run.h5"});
   EXPECT_EQ(no_study.exit_code, 2);
   EXPECT_THAT(no_study.err, HasSubstr("--study"));
+  place.write("large.csv", "time_s,volume_mL\n0,0\n0.4,2000\n0.8,800\n1.2,0\n");
+  const Ended large = run(place, shaped({"diastole", "simulate", "--shape", "large.csv", "-o", "x.run.h5"}));
+  EXPECT_EQ(large.exit_code, 2);
+  EXPECT_THAT(large.err, HasSubstr("large.csv: line 3: asks for 2000 mL"));
+  const Ended negative =
+      run(place, shaped({"diastole", "shape", wanted, "-o", "drive.csv", "--period-s", "-1"}));
+  EXPECT_EQ(negative.exit_code, 2);
+  EXPECT_THAT(negative.err, HasSubstr("--period-s: -1 is not above zero"));
   const Ended other =
       run(place, shaped({"diastole", "shape", wanted, "-o", "drive.csv", "--after",
                          std::string(DIASTOLE_SOURCE_DIR) + "/examples/recorded-baseline.run.h5"}));
   EXPECT_EQ(other.exit_code, 2);
   EXPECT_THAT(other.err, HasSubstr("/protocol/segments"));
   EXPECT_FALSE(std::filesystem::exists(place / "drive.csv"));
+}
+
+/// "Nobody answers" was what a forgotten study got.
+TEST(ShapeFlow, ReadsStudyAndCurveBeforeTheDaemonIsAsked) {
+  const Workplace place;
+  const auto live = [&](const std::string& target, const std::vector<std::string>& more) {
+    std::vector<std::string> words{"diastole", "run",      "--shape",  target,
+                                   "-o",       "x.run.h5", "--socket", "nobody"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run(place, words);
+  };
+  const Ended no_study = live(wanted, {});
+  EXPECT_EQ(no_study.exit_code, 2);
+  EXPECT_THAT(no_study.err, HasSubstr("option --study: is missing"));
+  const Ended other_study = live(wanted, {"--study", "other.study.toml"});
+  EXPECT_EQ(other_study.exit_code, 2);
+  EXPECT_THAT(other_study.err, HasSubstr("other.study.toml"));
+  const Ended no_curve = live("other.csv", {"--study", (example / "gel.study.toml").string()});
+  EXPECT_EQ(no_curve.exit_code, 2);
+  EXPECT_THAT(no_curve.err, HasSubstr("other.csv"));
+  const Ended nobody = live(wanted, {"--study", (example / "gel.study.toml").string()});
+  EXPECT_EQ(nobody.exit_code, 3);
+  EXPECT_FALSE(std::filesystem::exists(place / "x.1.csv")) << "it is written before there is a rig";
 }
 
 }  // namespace

@@ -1,5 +1,8 @@
 // A drive is learned on the simulated rig's plant, which shares no code with the model that learns.
 
+#include <fmt/format.h>
+
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
@@ -8,6 +11,7 @@
 #include "tests/tools/diastole/shape_loop.hpp"
 #include "tools/diastole/shape/drive_file.hpp"
 #include "tools/diastole/shape/pump.hpp"
+#include "tools/diastole/shape/shaper.hpp"
 #include "tools/diastole/shape/wanted_curve.hpp"
 
 namespace diastole::shaping {
@@ -80,6 +84,35 @@ TEST(Shape, ASpecimenThatIsToTakeMuchIsEmptiedNoFurther) {
   EXPECT_GE(points.back().volume_mL, 200);
   EXPECT_NEAR(points.front().volume_mL, -coarse.spacing_mL * static_cast<double>(coarse.points_emptied),
               1e-6);
+}
+
+TEST(Shape, ASpecimenIsFilledToAVolumeToAPressureOrToItsEnd) {
+  const rig::SpecimenFamily gel = rig::gel_family();
+  const rig::SpecimenReach to_volume = gel.reach(40, 1e3);
+  EXPECT_EQ(to_volume.volume_mL, 48) << "the first of its volumes, every 16 mL";
+  EXPECT_FALSE(to_volume.is_end);
+  const rig::SpecimenReach to_pressure = gel.reach(1e4, 5);
+  EXPECT_FALSE(to_pressure.is_end);
+  EXPECT_GE(to_pressure.pressure_kPa, 5);
+  EXPECT_LT(gel.reach(to_pressure.volume_mL - 16, 1e3).pressure_kPa, 5) << "it went on beyond";
+  const rig::SpecimenReach to_end = gel.reach(1e4, 1e3);
+  EXPECT_TRUE(to_end.is_end);
+  EXPECT_GT(to_end.pressure_kPa, to_pressure.pressure_kPa);
+  EXPECT_LT(to_end.volume_mL, 1e4);
+}
+
+TEST(Shape, WhatTheSpecimenIsExpectedToHoldGoesByTheModelAndByWhatTheBestRunHeldMore) {
+  const PeriodicCurve wanted = ventricle();
+  const DriveModel model = gel_model();
+  const PeriodicCurve first = model.inverse(wanted, wanted.with(harmonics_needed(wanted, 1e-3, 24)));
+  const double still_kPa = model.model().modulus_kPa * model.model().curve.at(range_mL).pressure_kPa;
+  EXPECT_NEAR(learn(model, wanted, first, {}, free_pump).greatest_kPa, still_kPa, 0.02 * still_kPa);
+  PlantForShape rig({}, plan);
+  std::vector<GatedRun> runs{gated_run(rig.play(first).run, model, period_s, 2 * first.harmonics())};
+  EXPECT_NEAR(runs.front().greatest_kPa, still_kPa, 0.05 * still_kPa);
+  constexpr double stiff_kPa = 10.0;
+  runs.front().greatest_kPa = stiff_kPa;
+  EXPECT_NEAR(learn(model, wanted, first, runs, free_pump).greatest_kPa, stiff_kPa, 0.02 * stiff_kPa);
 }
 
 TEST(Shape, TheNearestDriveKeepsWithinItsBounds) {
@@ -168,6 +201,24 @@ TEST(WantedCurve, ReadsTheExampleAndRefusesWhatDoesNotSayHowLargeItIs) {
   EXPECT_NEAR(sized.curve.range(), 16.0, 0.1);
 }
 
+TEST(WantedCurve, WhatTheFileStatesIsNotStatedByAnOptionToo) {
+  const std::filesystem::path examples = std::filesystem::path(DIASTOLE_SOURCE_DIR) / "examples";
+  const auto refusal = [&](const char* file, std::optional<double> period, std::optional<double> stroke_mL) {
+    try {
+      (void)read_wanted_curve({.file = examples / file, .period_s = period, .stroke_mL = stroke_mL});
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("it was accepted");
+  };
+  EXPECT_THAT(refusal("shape/ventricle.csv", 3.0, {}),
+              testing::HasSubstr("option --period-s: is 3, and the file's column time_s says 1.2"));
+  EXPECT_THAT(refusal("shape/ventricle.csv", {}, 3.0),
+              testing::HasSubstr("option --stroke-mL: is 3, and the file's column volume_mL says 24"));
+  EXPECT_THAT(refusal("heart.csv", {}, 3.0), testing::HasSubstr("option --period-s: is missing"));
+  EXPECT_THAT(refusal("heart.csv", 0.01, 3.0), testing::HasSubstr("option --period-s: is a cycle of 0.01 s"));
+}
+
 TEST(WantedCurve, BetweenFewPointsIsTheControllersCurve) {
   const test::ScratchFolder folder;
   const std::filesystem::path file = folder.path() / "wanted.csv";
@@ -199,6 +250,94 @@ TEST(WantedCurve, APressureIsWhatTheColumnsAreNamedAndNotACommentOfIt) {
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), testing::HasSubstr("line 4: pressure_kPa 1 lies below"));
   }
+}
+
+class ShaperTest : public testing::Test {
+ protected:
+  /// Of `points` through the example's study, whose run states no other limits than the usual ones.
+  [[nodiscard]] ShapeRequest request(const std::string& points) const {
+    return {.wanted = {.file = write("wanted.csv", points)},
+            .study = examples_ / "shape/gel.study.toml",
+            .rig = {},
+            .plan = {.cycles = 9}};
+  }
+  [[nodiscard]] std::filesystem::path rig_file(const std::string& limits) const {
+    return write("rig.toml",
+                 with(read(examples_ / "rig.toml"), "[daq]", "[controller.limits]\n" + limits + "\n[daq]"));
+  }
+  /// A tube whose wall of 1 mm holds less and less.
+  [[nodiscard]] std::filesystem::path thin_study() const {
+    const std::string study =
+        with(read(examples_ / "shape/gel.study.toml"), "outer_radius_mm = 50.0", "outer_radius_mm = 23.5");
+    return write("thin.study.toml", with(study, "../paper-gap", (examples_ / "paper-gap").string()));
+  }
+  static std::string with(std::string text, const std::string& what, const std::string& by) {
+    return text.replace(text.find(what), what.size(), by);
+  }
+  static std::string read(const std::filesystem::path& file) {
+    std::ifstream stream(file);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+  [[nodiscard]] std::filesystem::path write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_.path() / name) << text;
+    return folder_.path() / name;
+  }
+  static std::string refusal(const ShapeRequest& request) {
+    try {
+      require_playable(Shaper(request).after({}));
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "it was accepted";
+  }
+
+  const std::filesystem::path examples_ = std::filesystem::path(DIASTOLE_SOURCE_DIR) / "examples";
+  const test::ScratchFolder folder_;
+};
+
+/// 40 kPa were an offset of 178 mL, from a specimen's curve that ended at 56 mL.
+TEST_F(ShaperTest, RefusesAPressureBeyondTheRigsLimitOrTheSpecimen) {
+  const std::string high = "time_s,pressure_kPa\n0,0\n0.4,40\n0.8,16\n1.2,0\n";
+  EXPECT_THAT(refusal(request(high)),
+              testing::HasSubstr("wanted.csv: line 3: asks for 40 kPa, and the rig's limit cavity_kPa is 6"));
+  ShapeRequest thin = request(high);
+  thin.study = thin_study();
+  thin.rig = rig_file("cavity_kPa = 50");
+  EXPECT_THAT(refusal(thin), testing::ContainsRegex(
+                                 "wanted.csv: line 3: asks for 40 kPa, and the specimen's pressure rises to "
+                                 "[0-9.]+ kPa at [0-9]+ mL at the most"));
+}
+
+TEST_F(ShaperTest, RefusesAVolumeBeyondTheRigsLimitOrTheSpecimen) {
+  const std::string large = "time_s,volume_mL\n0,0\n0.4,2000\n0.8,800\n1.2,0\n";
+  EXPECT_THAT(
+      refusal(request(large)),
+      testing::ContainsRegex("wanted.csv: line 3: asks for 2000 mL, and the specimen holds [0-9.]+ kPa at "
+                             "[0-9]+ mL: the rig's limit cavity_kPa is 6"));
+  ShapeRequest thin = request(large);
+  thin.study = thin_study();
+  EXPECT_THAT(refusal(thin), testing::ContainsRegex(
+                                 "wanted.csv: line 3: asks for 2000 mL, and the specimen's pressure rises to "
+                                 "[0-9.]+ kPa at [0-9]+ mL at the most"));
+}
+
+TEST_F(ShaperTest, RefusesADriveWithWhichTheSpecimenHoldsMoreThanTheRigsLimit) {
+  ShapeRequest moderate = request(read(examples_ / "shape/ventricle.csv"));
+  EXPECT_EQ(refusal(moderate), "it was accepted");
+  moderate.rig = rig_file("cavity_kPa = 2.5");
+  EXPECT_THAT(
+      refusal(moderate),
+      testing::ContainsRegex("wanted.csv: drive: with it the specimen is expected to hold 3[.0-9]* kPa, "
+                             "and the rig's limit cavity_kPa is 2.5"));
+}
+
+TEST_F(ShaperTest, SaysInWordsWhichWaveformTheControllerWouldRefuse) {
+  std::string waves = "time_s,volume_mL\n";
+  for (int i = 0; i <= 400; ++i)
+    waves += fmt::format("{:.3f},{:.5f}\n", 0.03 * i, 4.0 * (1.0 - std::cos(2.0 * M_PI * 20.0 * i / 400.0)));
+  EXPECT_THAT(refusal(request(waves)), testing::HasSubstr("drive: the controller would refuse its waveform"));
+  const std::string less_than_a_step = "time_s,volume_mL\n0,0\n0.4,1e-6\n0.8,5e-7\n1.2,0\n";
+  EXPECT_THAT(refusal(request(less_than_a_step)), testing::HasSubstr("by its limit stroke_at_least"));
 }
 
 TEST(DriveFile, ARunKnowsWhereTheWantedCurveBegins) {

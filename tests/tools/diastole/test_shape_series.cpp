@@ -27,20 +27,24 @@ class ShapeSeriesTest : public testing::Test {
   [[nodiscard]] fs::path at(const std::string& name) const { return folder_.path() / name; }
 
   ExitCode carry_out(size_t iterations, bool force, const SessionSeries::Acquire& acquire,
-                     double tolerance_percent = 5) {
+                     double tolerance_percent = 5, const std::string& target = {}) {
     const fs::path example = fs::path(DIASTOLE_SOURCE_DIR) / "examples/shape";
     CLI::App command;
     const std::shared_ptr<SessionSeries> series = make_shape_series();
     series->add_options(command);
     command.parse(fmt::format("--shape {} --study {} --cycles 9 --iterations {} --tolerance-percent {}",
-                              (example / "ventricle.csv").string(), (example / "gel.study.toml").string(),
-                              iterations, tolerance_percent));
+                              target.empty() ? (example / "ventricle.csv").string() : target,
+                              (example / "gel.study.toml").string(), iterations, tolerance_percent));
     testing::internal::CaptureStdout();
     testing::internal::CaptureStderr();
     std::optional<InputError> refused;
     ExitCode code = ExitCode::bad_input;
     try {
-      code = series->carry_out(output().string(), force, acquire, {});
+      const auto connect = [&] {
+        ++connections_;
+        return acquire;
+      };
+      code = series->carry_out(output().string(), force, connect, {});
     } catch (const InputError& error) {
       refused = error;
     }
@@ -57,7 +61,9 @@ class ShapeSeriesTest : public testing::Test {
     volume_mL.pop_back();
     for (double& volume : volume_mL)
       volume = segment.offset_mL + segment.stroke_mL * volume;
-    runfile::RecordedRun run = plant_.play(periodic_curve(volume_mL, segment.period_s, 64)).run;
+    runfile::RecordedRun run = plant_->play(periodic_curve(volume_mL, segment.period_s, 64)).run;
+    for (size_t i = 0; i < run.pressure.time_s.size(); ++i)
+      if (run.pressure.time_s[i] > plan_.rest_s) run.pressure.channels["cavity_kPa"][i] += zero_drift_kPa_;
     run.run_id = fs::path(run_file).stem().string();
     run.started_utc = "2024-01-01T00:00:00Z";
     run.producer = "test";
@@ -70,11 +76,14 @@ class ShapeSeriesTest : public testing::Test {
     return {.run = run_file, .end = "completed", .regular = true, .cycles = 9, .triggers = 9};
   }
 
+  static constexpr CyclePlan plan_{.rest_s = 1.0, .cycles = 9, .settling = 3};
   std::string printed_, remarks_;
+  int connections_ = 0;
+  std::unique_ptr<PlantForShape> plant_ = std::make_unique<PlantForShape>(with_effects({}), plan_);
+  double zero_drift_kPa_ = 0.0;  ///< of the transducer, while the pump moves
 
  private:
   test::ScratchFolder folder_;
-  PlantForShape plant_{with_effects({}), {.rest_s = 1.0, .cycles = 9, .settling = 3}};
 };
 
 TEST_F(ShapeSeriesTest, TheSecondSessionPlaysWhatTheFirstHasTaught) {
@@ -100,6 +109,36 @@ TEST_F(ShapeSeriesTest, ABestRunThatMissesTheCurveIsANegativeAnswer) {
       << "five hidden effects, and nothing learned yet";
   EXPECT_THAT(remarks_, testing::HasSubstr("With the best drive that was run the specimen misses the curve"));
   EXPECT_THAT(remarks_, testing::HasSubstr("5 % are allowed"));
+}
+
+/// Three times as fast as the example.
+TEST_F(ShapeSeriesTest, NothingIsRunWhileTheModelItselfMissesTheCurve) {
+  std::ofstream(at("fast.csv")) << "time_s,volume_mL\n0,0\n0.05,1\n0.2,18\n0.3,24\n0.35,12\n0.4,0\n";
+  const SessionSeries::Acquire none = [](const std::string&, const std::string& run) { return clean(run); };
+  EXPECT_EQ(carry_out(2, false, none, 5, at("fast.csv").string()), ExitCode::negative);
+  EXPECT_EQ(connections_, 0);
+  EXPECT_THAT(remarks_,
+              testing::HasSubstr("With the nearest drive by the model the specimen misses the curve by "));
+  EXPECT_THAT(remarks_, testing::HasSubstr("Nothing was run."));
+  EXPECT_FALSE(fs::exists(at("followed.1.csv")));
+}
+
+TEST_F(ShapeSeriesTest, ALevelThatIsOffIsANegativeAnswerAndSaysWhatItPointsTo) {
+  for (const auto& [drift_kPa, side, cause] :
+       {std::tuple{0.4, "mL too high", "the transducer's zero has drifted"},
+        std::tuple{-0.4, "mL too low", "What leaks from cycle to cycle"}}) {
+    SCOPED_TRACE(side);
+    plant_ = std::make_unique<PlantForShape>(sim_rig::PlantConfig{}, plan_);
+    zero_drift_kPa_ = drift_kPa;
+    EXPECT_EQ(carry_out(1, true,
+                        [&](const std::string& experiment, const std::string& run) {
+                          return played(experiment, run);
+                        }),
+              ExitCode::negative);
+    EXPECT_THAT(remarks_, testing::HasSubstr(side));
+    EXPECT_THAT(remarks_, testing::HasSubstr(cause));
+    EXPECT_THAT(remarks_, testing::Not(testing::HasSubstr("misses the curve"))) << "its shape is right";
+  }
 }
 
 TEST_F(ShapeSeriesTest, AFaultySessionStopsTheSeriesAndKeepsItsExitCode) {

@@ -24,6 +24,7 @@ std::vector<int16_t> rises_of(const PeriodicCurve& drive, double begins_s, size_
   double largest = 0.0;
   for (size_t j = 0; j < points; ++j)
     largest = std::max(largest, std::abs(heights[j + 1] - heights[j]));
+  if (!(largest > 0.0)) return {};
   const double scale = std::floor(32766.0 / largest);
   std::vector<int16_t> rises;
   for (size_t j = 0; j < points; ++j)
@@ -95,7 +96,7 @@ PlannedCycle Pump::planned(const PeriodicCurve& drive_mL) const {
   }
   PlannedCycle cycle{.fraction = {}, .period_s = drive_mL.period_s, .limits = {}, .refusal = {}};
   if (rises.empty()) {
-    cycle.refusal = "waveform_unfit";
+    cycle.refusal = unfit_waveform;
     return cycle;
   }
   waveform.rises = rises;
@@ -120,6 +121,7 @@ PlannedCycle Pump::planned(const PeriodicCurve& drive_mL) const {
   program.segments[0] = segment;
   if (const auto checked = firmware::check_program(program, settings_); !checked.ok())
     cycle.refusal = limit_names[static_cast<size_t>(checked.error().limit)];
+  if (settings_.steps_of_nL(segment.stroke_nL).count == 0) return cycle;  // it has no first step
   cycle.lead_s = std::fmod(drive_mL.period_s - begins_s, drive_mL.period_s);
   const double first_step_ms = 1e-3 * static_cast<double>(firmware::first_step_us(segment, settings_));
   const double most_ms =

@@ -13,12 +13,15 @@
 namespace diastole::shaping {
 
 struct LimitUse {
-  std::string limit;  ///< as protocol/wire/limit_list.inc names it
+  std::string limit;  ///< as protocol/wire/limit_list.inc names it, or "cavity"
   double asked = 0.0, allowed = 0.0;
   std::string unit;
 
   [[nodiscard]] double share() const { return asked / allowed; }
 };
+
+/// A waveform that the controller does not take at all (wire::Refusal::waveform_unfit).
+inline constexpr const char* unfit_waveform = "waveform_unfit";
 
 /// One cycle as an uploaded waveform.
 struct PlannedCycle {
@@ -30,13 +33,15 @@ struct PlannedCycle {
   double trigger_delay_ms = 0.0;  ///< with which the trigger comes there, or as near as it may
   double trigger_late_ms = 0.0;   ///< by which it comes later all the same
   std::vector<LimitUse> limits;
-  std::string refusal;  ///< the first limit that it exceeds; empty: none
+  std::string refusal;  ///< the first limit that it exceeds, or unfit_waveform; empty: none
 };
 
 class Pump {
  public:
   explicit Pump(const RigConfig& rig);
 
+  /// What the specimen may hold against the piston: the pressure limit's check counts with it.
+  [[nodiscard]] double cavity_limit_kPa() const { return 1e-3 * settings_.limits().cavity_Pa; }
   /// RMS by which the piston's whole microsteps are beside a curve.
   [[nodiscard]] double rounding_mL() const;
 

@@ -43,6 +43,7 @@ ExitCode shape(const ShapeOptions& options, const CommandOutput& out) {
   fmt::print(stderr, "Solving the specimen and inverting the rig's model.\n");
   const Shaper shaper(options.request);
   const Shaping shaping = shaper.after(options.runs);
+  require_playable(shaping);
   const bool changed = shaping.lesson.ending == shaping::Ending::changed;
   if (!changed) {
     fs::remove(experiment);  // which would play other points
@@ -52,10 +53,11 @@ ExitCode shape(const ShapeOptions& options, const CommandOutput& out) {
   }
   if (!options.page.empty())
     write_whole_file(options.page, shaping_page(shaping, shaper.wanted_mL(), shaper.target()));
-  const bool is_followed = !changed && shaper.is_within_tolerance(shaping.drive_nrmse);
+  const bool is_followed = !changed && shaper.is_within_tolerance(shaping.drive);
   if (out.json) {
     shaping::Json document = shaping_json(shaping);
     document["tolerance"] = shaper.tolerance();
+    document["level_tolerance_mL"] = shaper.level_tolerance_mL(shaping.drive);
     document["followed"] = is_followed;
     document["drive"] = changed ? shaping::Json() : shaping::Json(options.drive.string());
     document["experiment"] = changed ? shaping::Json() : shaping::Json(experiment.string());
@@ -66,8 +68,7 @@ ExitCode shape(const ShapeOptions& options, const CommandOutput& out) {
     if (changed) fmt::print("No drive was written: find what has changed first.\n");
     if (!changed) fmt::print("{} and {}\n", options.drive.string(), experiment.string());
   }
-  if (!changed && !is_followed)
-    fmt::print(stderr, "{}", shaper.miss_in_words("this drive", shaping.drive_nrmse));
+  if (!changed && !is_followed) fmt::print(stderr, "{}", shaper.miss_in_words("this drive", shaping.drive));
   return is_followed ? ExitCode::done : ExitCode::negative;
 }
 
@@ -88,8 +89,8 @@ void add_shape(CommandLine& line) {
       "second.run.h5\n"
       "      all runs so far, in their order: the best is kept\n"
       "`diastole run --shape` does it live. Exit code 1: with this drive, the nearest that the pump can do,\n"
-      "the specimen misses the curve by more than --tolerance-percent; or the specimen or the rig has\n"
-      "changed, and no drive is written.");
+      "the specimen misses the curve, or its level, by more than --tolerance-percent of the range; or the\n"
+      "specimen or the rig has changed, and no drive is written.");
   command
       ->add_option("TARGET", options->request.wanted.file,
                    "wanted curve: time_s or phase, volume_mL, pressure_kPa or fraction")

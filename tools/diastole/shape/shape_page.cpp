@@ -73,8 +73,9 @@ report::Figure contraction(const Lesson& lesson) {
 std::string shaping_page(const Shaping& shaping, const PeriodicCurve& wanted_mL, const std::string& target) {
   const Lesson& lesson = shaping.lesson;
   report::Page page(fmt::format("The specimen follows {}", target));
-  page.headline("NRMSE", fmt::format("{:.2f} %", 100.0 * shaping.nrmse),
+  page.headline("NRMSE", fmt::format("{:.2f} %", 100.0 * shaping.seen.nrmse),
                 lesson.best ? "of the best run, about the mean" : "as the model expects, before any run");
+  page.headline("level", fmt::format("{:+.2f} mL", shaping.seen.level_mL), "mean volume less the wanted one");
   page.headline("runs", fmt::format("{}", lesson.iterations.size()), in_words(lesson.ending));
   page.headline("held back by", shaping.binding_limit.empty() ? "nothing" : shaping.binding_limit,
                 "of the pump's limits");
@@ -86,7 +87,8 @@ std::string shaping_page(const Shaping& shaping, const PeriodicCurve& wanted_mL,
       [](const LimitUse& use) {
         return report::Page::Row{use.limit, number(use.asked), number(use.allowed), use.unit};
       },
-      "As the controller checks them before anything moves.", 3);
+      "As the controller checks them before anything moves; cavity: what the specimen is expected to hold.",
+      3);
   for (size_t i = 0; i < lesson.iterations.size(); ++i) {
     const Iteration& it = lesson.iterations[i];
     page.section(fmt::format("Run {}: NRMSE {:.2f} %", i + 1, 100.0 * it.nrmse),

@@ -27,8 +27,10 @@ void add_request_to(CLI::App& command, ShapeRequest& request) {
                      "study of rig and specimen, as `explain` wrote it (.study.toml)");
   command.add_option("--rig", request.rig,
                      "rig file whose limits hold, instead of those of the study's first run");
-  command.add_option("--period-s", request.wanted.period_s, "of a curve that is given by phase");
-  command.add_option("--stroke-mL", request.wanted.stroke_mL, "of a curve that is given by fraction");
+  command.add_option("--period-s", request.wanted.period_s, "of a curve that is given by phase")
+      ->check(positive_number);
+  command.add_option("--stroke-mL", request.wanted.stroke_mL, "of a curve that is given by fraction")
+      ->check(positive_number);
   command
       .add_option("--least", request.wanted.least,
                   "what the curve's lowest point stands for: mL since rest, or kPa")
@@ -74,12 +76,15 @@ class ShapeSeries final : public SessionSeries {
       option->needs(shape);  // a session of an experiment has no use for it
   }
   [[nodiscard]] bool asked() const override { return !request_.wanted.file.empty(); }
-  ExitCode carry_out(const std::string& output, bool force, const Acquire& acquire,
+  ExitCode carry_out(const std::string& output, bool force, const Connect& connect,
                      const CommandOutput& out) override;
 
  private:
   void check_outputs(const fs::path& output, bool force) const;
   static void remove_earlier(const fs::path& output);
+  /// Sessions until there is nothing to learn; the last one's exit code.
+  ExitCode learn_from_runs(const Shaper& shaper, Shaping& shaping, const fs::path& output,
+                           const Acquire& acquire, const CommandOutput& out);
   /// A session with this drive.
   SessionResult run_once(const Shaping& shaping, const fs::path& output, const Acquire& acquire);
 
@@ -128,16 +133,12 @@ SessionResult ShapeSeries::run_once(const Shaping& shaping, const fs::path& outp
   return result;
 }
 
-ExitCode ShapeSeries::carry_out(const std::string& output, bool force, const Acquire& acquire,
-                                const CommandOutput& out) {
-  check_outputs(output, force);
-  fmt::print(stderr, "Solving the specimen and inverting the rig's model.\n");
-  const Shaper shaper(request_);
-  Shaping shaping = shaper.after({});
-  if (force) remove_earlier(output);
+ExitCode ShapeSeries::learn_from_runs(const Shaper& shaper, Shaping& shaping, const fs::path& output,
+                                      const Acquire& acquire, const CommandOutput& out) {
   std::string end;
   ExitCode code = ExitCode::done;
   while (runs_.size() < iterations_ && shaping.lesson.ending == Ending::none) {
+    require_playable(shaping);
     const SessionResult result = run_once(shaping, output, acquire);
     code = exit_code_of(result);
     if (!result.regular || result.end != "completed") end = result.end;
@@ -146,18 +147,38 @@ ExitCode ShapeSeries::carry_out(const std::string& output, bool force, const Acq
     shaping = shaper.after(runs_);
     if (!out.json) fmt::print("{}\n", shaping_words(shaping));
   }
-  if (shaping.lesson.ending == Ending::changed) code = std::max(code, ExitCode::negative);
-  const bool is_within = shaping.lesson.best && shaper.is_within_tolerance(shaping.nrmse);
-  const bool is_missed = shaping.lesson.best && !is_within;
-  if (is_missed) code = std::max(code, ExitCode::negative);
-  if (!page_.empty()) write_whole_file(page_, shaping_page(shaping, shaper.wanted_mL(), shaper.target()));
   if (!end.empty())
     fmt::print(stderr, "The last session did not end as planned ({}): learning stops.\n", end);
-  if (is_missed) fmt::print(stderr, "{}", shaper.miss_in_words("the best drive that was run", shaping.nrmse));
+  return code;
+}
+
+ExitCode ShapeSeries::carry_out(const std::string& output, bool force, const Connect& connect,
+                                const CommandOutput& out) {
+  check_outputs(output, force);
+  fmt::print(stderr, "Solving the specimen and inverting the rig's model.\n");
+  const Shaper shaper(request_);
+  Shaping shaping = shaper.after({});
+  require_playable(shaping);
+  ExitCode code = ExitCode::negative;
+  if (shaper.is_within_tolerance(shaping.drive)) {
+    const Acquire acquire = connect();
+    if (force) remove_earlier(output);
+    code = learn_from_runs(shaper, shaping, output, acquire, out);
+  } else {
+    fmt::print(stderr, "{}Nothing was run.\n",
+               shaper.miss_in_words("the nearest drive by the model", shaping.drive));
+  }
+  const bool is_within = shaping.lesson.best && shaper.is_within_tolerance(shaping.seen);
+  const bool is_missed = shaping.lesson.best && !is_within;
+  const bool is_changed = shaping.lesson.ending == Ending::changed;
+  if (is_missed || is_changed) code = std::max(code, ExitCode::negative);
+  if (!page_.empty()) write_whole_file(page_, shaping_page(shaping, shaper.wanted_mL(), shaper.target()));
+  if (is_missed) fmt::print(stderr, "{}", shaper.miss_in_words("the best drive that was run", shaping.seen));
   if (out.json) {
     Json document = shaping_json(shaping);
     document["tolerance"] = shaper.tolerance();
-    document["followed"] = is_within && shaping.lesson.ending != Ending::changed;
+    document["level_tolerance_mL"] = shaper.level_tolerance_mL(shaping.seen);
+    document["followed"] = is_within && !is_changed;
     document["runs"] = Json::array();
     for (const fs::path& run : runs_)
       document["runs"].push_back(run.string());

@@ -17,18 +17,70 @@ namespace {
 
 constexpr Eigen::Index fine = 96;  ///< harmonics of a wanted curve
 
-WantedCurve wanted_of(const ShapeRequest& request) { return read_wanted_curve(request.wanted); }
+constexpr const char* raise_cavity_limit =
+    "Want less; or, if specimen and rig bear more, say so by controller.limits.cavity_kPa of a rig file "
+    "(--rig).";
 
-DriveModel model_of(const ShapeRequest& request, const WantedCurve& wanted) {
-  constexpr double room = 1.3;  // for runs that go beyond what is wanted
-  const std::vector<double> values = wanted.curve.at_even(static_cast<size_t>(4 * fine));
-  const double largest_mL = wanted.is_pressure ? 0.0 : room * std::ranges::max(values);
+[[noreturn]] void refuse_target(const ShapeRequest& request, const WantedCurve& target,
+                                const std::string& problem, const char* remedy) {
+  throw InputError(
+      {request.wanted.file.string(), fmt::format("line {}", target.greatest_line),
+       fmt::format("asks for {:g} {}, and {}", target.greatest, target.is_pressure ? "kPa" : "mL", problem),
+       remedy});
+}
+
+/// The volume up to which the specimen's curve has to be known. Throws InputError if the target is beyond the specimen or the rig's limit.
+double largest_volume_mL(const ShapeRequest& request, const WantedCurve& target, double cavity_limit_kPa) {
+  constexpr double room = 1.3;                // for runs that go beyond what is wanted
+  constexpr double beyond_any_mL = 50'000.0;  // of what pumps displace
+  const std::string limit = fmt::format("the rig's limit cavity_kPa is {:g}", cavity_limit_kPa);
+  if (target.is_pressure && target.greatest > cavity_limit_kPa)
+    refuse_target(request, target, limit, raise_cavity_limit);
+  const rig::SpecimenReach reach =
+      specimen_reach(read_study(request.study), target.is_pressure ? beyond_any_mL : room * target.greatest,
+                     room * (target.is_pressure ? target.greatest : cavity_limit_kPa));
+  if (target.greatest > (target.is_pressure ? reach.pressure_kPa : reach.volume_mL)) {
+    const std::string reached = fmt::format("{:.3g} kPa at {:g} mL", reach.pressure_kPa, reach.volume_mL);
+    if (!reach.is_end)
+      refuse_target(request, target, fmt::format("the specimen holds {}: {}", reached, limit),
+                    raise_cavity_limit);
+    refuse_target(request, target, fmt::format("the specimen's pressure rises to {} at the most", reached),
+                  "Want less: `diastole pv` shows its pressure by its volume.");
+  }
+  return reach.is_end && !target.is_pressure ? target.greatest : reach.volume_mL;
+}
+
+DriveModel model_of(const ShapeRequest& request, const WantedCurve& target, double cavity_limit_kPa) {
   if (request.plan.cycles < request.plan.settling + 6) {
     throw InputError({"", "option --cycles", fmt::format("{} are too few", request.plan.cycles),
                       fmt::format("The first {} set in, and six are averaged: give {} or more.",
                                   request.plan.settling, request.plan.settling + 6)});
   }
-  return drive_model_of(read_study(request.study), largest_mL, request.plan);
+  return drive_model_of(read_study(request.study), largest_volume_mL(request, target, cavity_limit_kPa),
+                        request.plan);
+}
+
+/// Of a pressure. Throws InputError if the effects of the study make the specimen end before.
+PeriodicCurve wanted_volume(const ShapeRequest& request, const WantedCurve& target, const DriveModel& model) {
+  if (!target.is_pressure) return target.curve;
+  const PeriodicCurve volume = specimen_volume(model, target.curve, fine);
+  const double greatest_mL = std::ranges::max(volume.at_even(static_cast<size_t>(4 * fine)));
+  const rig::SpecimenCurve& curve = model.model().curve;
+  const double end_mL = curve.points().back().volume_mL;
+  if (greatest_mL <= end_mL) return volume;
+  refuse_target(request, target,
+                fmt::format("with its effects the study's specimen reaches {:.3g} kPa at {:g} mL at the most",
+                            model.model().modulus_kPa * curve.at(end_mL).pressure_kPa, end_mL),
+                "Want less.");
+}
+
+/// What a level that is off points to.
+const char* cause_of(double level_mL) {
+  return level_mL < 0.0
+             ? "What leaks from cycle to cycle no drive that repeats itself brings back; or a limit "
+               "holds the drive down."
+             : "The specimen was fuller when the run began than is thought, the transducer's zero has "
+               "drifted, or the piston would have to go below home.";
 }
 
 RigConfig rig_of(const ShapeRequest& request) {
@@ -58,9 +110,11 @@ std::string binding_of(const Shaping& shaping) {
 }  // namespace
 
 Shaper::Shaper(const ShapeRequest& request)
-    : request_(request), model_(model_of(request, wanted_of(request))), pump_(rig_of(request)) {
-  const WantedCurve wanted = wanted_of(request);
-  wanted_mL_ = wanted.is_pressure ? specimen_volume(model_, wanted.curve, fine) : wanted.curve;
+    : request_(request),
+      target_(read_wanted_curve(request.wanted)),
+      pump_(rig_of(request)),
+      model_(model_of(request, target_, pump_.cavity_limit_kPa())),
+      wanted_mL_(wanted_volume(request, target_, model_)) {
   const PeriodicCurve free = model_.inverse(wanted_mL_, wanted_mL_.with(harmonics_of(wanted_mL_)));
   first_mL_ = pump_.nearest(free, model_.jacobian(free));
   first_is_bounded_ = rms_between(free, first_mL_) > 1e-6 * wanted_mL_.range();
@@ -86,50 +140,88 @@ Shaping Shaper::after(const std::vector<std::filesystem::path>& runs) const {
                   .binding_limit = {}};
   if (gated.empty()) shaping.lesson.bounded = first_is_bounded_;
   plan_cycle(shaping);
-  shaping.binding_limit = binding_of(shaping);
-  PeriodicCurve expected = shaping.lesson.expected_mL;
-  expected.c[0] = wanted_mL_.c[0];
-  const std::vector<Iteration>& runs_so_far = shaping.lesson.iterations;
-  shaping.drive_nrmse =
-      std::hypot(rms_between(expected, wanted_mL_), pump_.rounding_mL()) / wanted_mL_.range();
-  shaping.nrmse = shaping.drive_nrmse;
-  if (!runs_so_far.empty())
-    shaping.nrmse = runs_so_far[shaping.lesson.best.value_or(runs_so_far.size() - 1)].nrmse;
-  if (shaping.lesson.ending != Ending::none) shaping.drive_nrmse = shaping.nrmse;
+  estimate_deviations(shaping);
   return shaping;
-}
-
-std::string Shaper::miss_in_words(std::string_view who, double nrmse) const {
-  return fmt::format(
-      "With {} the specimen misses the curve by {:.2f} % of its range, and {:g} % are allowed "
-      "(--tolerance-percent).\n  Want a smaller range or a longer period, or allow more.\n",
-      who, 100.0 * nrmse, request_.tolerance_percent);
 }
 
 void Shaper::plan_cycle(Shaping& shaping) const {
   Lesson& lesson = shaping.lesson;
   shaping.cycle = pump_.planned(lesson.drive_mL);
-  if (shaping.cycle.refusal.empty() || lesson.ending == Ending::changed) return;
-  // A drive that was run, read back from its points, may be a rounding beyond a limit that it had reached.
-  lesson.drive_mL = pump_.nearest(lesson.drive_mL, model_.jacobian(lesson.drive_mL));
-  shaping.cycle = pump_.planned(lesson.drive_mL);
-  const std::string& limit = shaping.cycle.refusal;
-  if (limit.empty()) return;
-  const auto use = std::ranges::find(shaping.cycle.limits, limit, &LimitUse::limit);
-  throw InputError(
-      {request_.wanted.file.string(), "drive",
-       use == shaping.cycle.limits.end()
-           ? fmt::format("the controller would refuse it: {}", limit)
-           : fmt::format("the controller would refuse it: {} is {:.6g} {}, and {:.6g} are allowed", limit,
-                         use->asked, use->unit, use->allowed),
-       "Want a smaller range or a longer period, or give a rig with other limits (--rig)."});
+  const bool is_to_be_played = lesson.ending != Ending::changed;
+  if (!shaping.cycle.refusal.empty() && is_to_be_played) {
+    // A drive that was run, read back from its points, may be a rounding beyond a limit that it had reached.
+    lesson.drive_mL = pump_.nearest(lesson.drive_mL, model_.jacobian(lesson.drive_mL));
+    shaping.cycle = pump_.planned(lesson.drive_mL);
+  }
+  shaping.binding_limit = binding_of(shaping);
+  shaping.cycle.limits.push_back({"cavity", lesson.greatest_kPa, pump_.cavity_limit_kPa(), "kPa"});
+  if (is_to_be_played) shaping.refusal = refusal_of(shaping.cycle);
+}
+
+std::optional<InputFault> Shaper::refusal_of(const PlannedCycle& cycle) const {
+  const auto refused = [&](const std::string& problem, const char* remedy) {
+    return InputFault{request_.wanted.file.string(), "drive", problem, remedy};
+  };
+  if (cycle.refusal == unfit_waveform) {
+    return refused(
+        "the controller would refuse its waveform: it turns more sharply than 4294 strokes a period squared",
+        "Smooth the curve, or give each of its waves a cycle of its own.");
+  }
+  if (!cycle.refusal.empty()) {
+    const auto use = std::ranges::find(cycle.limits, cycle.refusal, &LimitUse::limit);
+    return refused(
+        use == cycle.limits.end()
+            ? fmt::format("the controller would refuse it by its limit {}", cycle.refusal)
+            : fmt::format("the controller would refuse it: {} is {:.6g} {}, and {:.6g} are allowed",
+                          use->limit, use->asked, use->unit, use->allowed),
+        "Want another range or a longer period, or give a rig with other limits (--rig).");
+  }
+  const LimitUse& cavity = cycle.limits.back();
+  if (cavity.asked <= cavity.allowed) return {};
+  return refused(fmt::format("with it the specimen is expected to hold {:.3g} kPa, and the rig's limit "
+                             "cavity_kPa is {:g}",
+                             cavity.asked, cavity.allowed),
+                 raise_cavity_limit);
+}
+
+void Shaper::estimate_deviations(Shaping& shaping) const {
+  const Lesson& lesson = shaping.lesson;
+  PeriodicCurve expected = lesson.expected_mL;
+  shaping.drive.level_mL = (expected.c[0] - wanted_mL_.c[0]).real();
+  expected.c[0] = wanted_mL_.c[0];
+  shaping.drive.nrmse =
+      std::hypot(rms_between(expected, wanted_mL_), pump_.rounding_mL()) / wanted_mL_.range();
+  shaping.seen = shaping.drive;
+  if (!lesson.iterations.empty()) {
+    const Iteration& shown = lesson.iterations[lesson.best.value_or(lesson.iterations.size() - 1)];
+    shaping.seen = {shown.nrmse, shown.level_error_mL, shown.level_sd_mL};
+    shaping.drive.level_sd_mL = shown.level_sd_mL;
+  }
+  if (lesson.ending != Ending::none) shaping.drive = shaping.seen;
+}
+
+std::string Shaper::miss_in_words(std::string_view who, const Deviation& off) const {
+  std::string words;
+  if (off.nrmse > tolerance())
+    words += fmt::format(
+        "With {} the specimen misses the curve by {:.2f} % of its range, and {:g} % are allowed "
+        "(--tolerance-percent).\n  Want a smaller range or a longer period, or allow more.\n",
+        who, 100.0 * off.nrmse, request_.tolerance_percent);
+  if (std::abs(off.level_mL) > level_tolerance_mL(off))
+    words += fmt::format(
+        "With {} the specimen's mean volume is {:.2f} mL too {}, and {:.2f} mL are allowed "
+        "(--tolerance-percent).\n  {}\n",
+        who, std::abs(off.level_mL), off.level_mL < 0.0 ? "low" : "high", level_tolerance_mL(off),
+        cause_of(off.level_mL));
+  return words;
 }
 
 Json shaping_json(const Shaping& shaping) {
   const Lesson& lesson = shaping.lesson;
   const auto or_null = [](const std::string& text) { return text.empty() ? Json() : Json(text); };
-  Json document{{"nrmse", shaping.nrmse},
-                {"drive_nrmse", shaping.drive_nrmse},
+  Json document{{"nrmse", shaping.seen.nrmse},
+                {"drive_nrmse", shaping.drive.nrmse},
+                {"drive_level_error_mL", shaping.drive.level_mL},
                 {"binding_limit", or_null(shaping.binding_limit)}};
   document["iterations"] = Json::array();
   for (const Iteration& it : lesson.iterations)
@@ -177,16 +269,15 @@ std::string shaping_words(const Shaping& shaping) {
                         lesson.best == i ? "  <- best" : "");
   }
   if (lesson.iterations.empty())
-    text += fmt::format("by the model alone: NRMSE {:.2f} %\n", 100.0 * shaping.nrmse);
+    text += fmt::format("by the model alone: NRMSE {:.2f} %, level {:+.2f} mL\n", 100.0 * shaping.seen.nrmse,
+                        shaping.seen.level_mL);
   if (lesson.best) {
     const Iteration& best = lesson.iterations[*lesson.best];
     constexpr double much = 0.01;  // of the range: what the shape is held to
     const double part = std::abs(best.level_error_mL) / best.cavity_mL.range();
     if (part > much)
-      text += fmt::format(
-          "its shape is right to that, its mean volume is {:+.2f} mL off, {:.0f} % of the range: "
-          "what leaks from cycle to cycle no drive that repeats itself brings back\n",
-          best.level_error_mL, 100.0 * part);
+      text += fmt::format("its mean volume is {:+.2f} mL off, {:.0f} % of the range. {}\n",
+                          best.level_error_mL, 100.0 * part, cause_of(best.level_error_mL));
   }
   if (lesson.ending != Ending::none) text += fmt::format("{}: {}\n", in_words(lesson.ending), lesson.reason);
   text += fmt::format(

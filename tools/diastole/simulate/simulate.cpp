@@ -214,12 +214,15 @@ ExitCode simulate_series(const SimulateOptions& options, SessionSeries& series, 
   if (!options.rig.pins.empty()) {
     throw InputError({"", "option --pins", "is for one session", "Leave it out beside --shape."});
   }
-  std::optional<Simulation> simulation;  // started when the first drive is known
+  std::optional<Simulation> simulation;
+  const SessionSeries::Acquire acquire = [&](const std::string& experiment, const std::string& run) {
+    return simulation->acquire(experiment, run);
+  };
   const ExitCode code = series.carry_out(
       options.session.output, options.session.force,
-      [&](const std::string& experiment, const std::string& run) {
-        if (!simulation) simulation.emplace(options);
-        return simulation->acquire(experiment, run);
+      [&] {
+        simulation.emplace(options);
+        return acquire;
       },
       out);
   if (simulation) simulation->stop();
