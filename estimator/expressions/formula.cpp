@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole::expressions {
 namespace {
@@ -69,7 +70,7 @@ class Parser {
     Part part = guarded([&] { return binary(0); });
     skip();
     if (at_ < rest_.size())
-      fail(at_, fmt::format("\"{}\" is not expected here", rest_[at_]),
+      fail(at_, fmt::format("\"{}\" is not expected here", character_at(rest_, at_)),
            "An operator (+ - * / ^) or the formula's end comes here.");
     if (part.is_condition)
       fail(part.offset, "is true or false, not a number", "Use it in if(condition, then, else).");
@@ -115,7 +116,8 @@ class Parser {
   }
   void need(char sign, size_t opened) {
     if (!take(sign)) {
-      const std::string found = at_ < rest_.size() ? fmt::format("\"{}\"", rest_[at_]) : "the end";
+      const std::string found =
+          at_ < rest_.size() ? fmt::format("\"{}\"", character_at(rest_, at_)) : "the end";
       fail(at_, fmt::format("{} stands where \"{}\" is expected", found, sign),
            fmt::format("It closes what begins at {}.", text_.place(opened)));
     }
@@ -206,7 +208,8 @@ class Parser {
       default:
         require_value(a);
         require_value(b);
-        if (by.operation == Operation::divide && b.is_zero) fail(b.offset, "divides by zero", "Correct it.");
+        if (by.operation == Operation::divide && (b.is_zero || graph_.is_number(b.is.node, 0.0)))
+          fail(b.offset, "divides by zero", "Correct it.");
         whole.is = {graph_.make(by.operation, a.is.node, b.is.node),
                     by.operation == Operation::multiply ? a.is.unit * b.is.unit : a.is.unit / b.is.unit};
         whole.is_zero = a.is_zero || b.is_zero;
@@ -264,7 +267,7 @@ class Parser {
     if (std::isdigit(static_cast<unsigned char>(sign)) != 0 || sign == '.') return written_number();
     if (std::isalpha(static_cast<unsigned char>(sign)) != 0 || sign == '_') return name();
     if (sign == '\0') fail(at, "ends where a quantity is expected", "Complete the formula.");
-    fail(at, fmt::format("\"{}\" stands where a quantity is expected", sign),
+    fail(at, fmt::format("\"{}\" stands where a quantity is expected", character_at(rest_, at)),
          "A number, a name, a function or a bracket comes here.");
   }
 
@@ -394,9 +397,20 @@ NodeId parse_formula_in(const PlacedText& text, const Scope& scope, Graph& graph
 
 bool is_name(std::string_view text) {
   if (text.empty() || text == "pi" || function_named(text) != nullptr) return false;
-  if (std::isdigit(static_cast<unsigned char>(text.front())) != 0) return false;
+  if (std::isalpha(static_cast<unsigned char>(text.front())) == 0) return false;
   return std::ranges::all_of(
       text, [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; });
+}
+
+std::string read_id(TableReader& root) {
+  std::string id = root.text("id");
+  const bool is_id = !id.empty() && std::ranges::all_of(id, [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-';
+  });
+  if (!is_id)
+    root.fail("id", fmt::format("\"{}\" is no id", id),
+              "Write small letters, digits and hyphens, as \"my-seal\".");
+  return id;
 }
 
 }  // namespace diastole::expressions

@@ -51,4 +51,7 @@ NodeId parse_formula_in(const PlacedText& text, const Scope& scope, Graph& graph
 /// Whether a name may be used: a letter, then letters, digits and _; not that of a function.
 bool is_name(std::string_view text);
 
+/// The id of a file with formulas: small letters, digits and hyphens.
+std::string read_id(TableReader& root);
+
 }  // namespace diastole::expressions

@@ -127,6 +127,14 @@ void append(std::string& above, std::string& below, std::string_view name, doubl
   side += std::abs(power) == 1.0 ? std::string(name) : fmt::format("{}^{:.3g}", name, std::abs(power));
 }
 
+std::string name_of_number(const Unit& unit) {
+  if (factor_between(unit, {}) == 1.0) return "a pure number";
+  for (const Named& known : known_units)
+    if (known.powers == std::array<int, 4>{} && factor_between(unit, {{}, known.scale}) == 1.0)
+      return std::string(known.name);
+  return fmt::format("a pure number times {:.6g}", unit.scale);
+}
+
 }  // namespace
 
 Unit operator*(const Unit& a, const Unit& b) {
@@ -168,7 +176,7 @@ std::string name_of(const Unit& unit) {
   const double temperature = unit.twelfths[3] / 12.0;
   double scale = unit.scale;
   std::string above, below;
-  if (unit.is_number() && factor_between(unit, {}) == 1.0) return "a pure number";
+  if (unit.is_number()) return name_of_number(unit);
   const double volume = (length + mass) / 3.0;
   append(above, below, "kPa", mass);
   if (volume == std::round(volume)) {

@@ -32,7 +32,7 @@ double factor_between(const Unit& from, const Unit& to);
 /// None if the text is no unit.
 std::optional<Unit> parse_unit(std::string_view text);
 
-/// In kPa, mL and s where that is possible, else in mm, kg, s: "mL/s", "1e-3 kPa", "a pure number".
+/// In kPa, mL and s where that is possible, else in mm, kg, s: "mL/s", "1e-3 kPa", "a pure number", "%".
 std::string name_of(const Unit& unit);
 
 }  // namespace diastole::expressions

@@ -7,6 +7,18 @@
 namespace diastole {
 namespace {
 
+/// Control characters that a file holds would act on the terminal.
+std::string printable(const std::string& text) {
+  constexpr unsigned first_printable = 0x20, deleted = 0x7F;
+  std::string out;
+  for (const char c : text) {
+    const auto code = static_cast<unsigned char>(c);
+    const bool is_printed = (code >= first_printable && code != deleted) || c == '\n' || c == '\t';
+    out += is_printed ? std::string(1, c) : fmt::format("\\x{:02X}", code);
+  }
+  return out;
+}
+
 std::string message_of(const InputFault& fault) {
   std::string text;
   for (const std::string& part : {fault.file, fault.place}) {
@@ -14,7 +26,7 @@ std::string message_of(const InputFault& fault) {
   }
   text += fault.problem;
   if (!fault.remedy.empty()) text += "\n  " + fault.remedy;
-  return text;
+  return printable(text);
 }
 
 }  // namespace

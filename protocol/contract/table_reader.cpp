@@ -67,9 +67,9 @@ bool within(double value, const NumberRange& range) {
 std::string PlacedText::place(size_t offset) const {
   size_t at_line = line;
   size_t at_column = column;
-  for (size_t i = 0; i < std::min(offset, text.size()); ++i) {
-    at_column = text[i] == '\n' ? 1 : at_column + 1;
-    at_line += text[i] == '\n' ? 1 : 0;
+  for (const char c : std::string_view(text).substr(0, offset)) {
+    if (begins_character(c)) at_column = c == '\n' ? 1 : at_column + 1;
+    at_line += c == '\n' ? 1 : 0;
   }
   return fmt::format("line {}, column {}, key {}", at_line, at_column, key);
 }
@@ -168,7 +168,7 @@ PlacedText TableReader::placed_text(std::string_view key) {
   const size_t lines = source.end.line - source.begin.line;
   const size_t width = source.end.column - source.begin.column;
   // Three quotes stand before a text that is longer by four than with one; a line break behind them is none of its own.
-  const bool in_three = lines > 0 || width >= placed.text.size() + 6;
+  const bool in_three = lines > 0 || width >= characters_of(placed.text) + 6;
   placed.line = source.begin.line + (lines > breaks ? 1 : 0);
   placed.column = lines > breaks ? 1 : source.begin.column + (in_three ? 3 : 1);
   return placed;

@@ -33,7 +33,7 @@ struct PlacedText {
   size_t line = 1;       ///< of the text's first character
   size_t column = 1;
 
-  /// "line 12, column 17, key equations.q_hose" of the character at this offset.
+  /// "line 12, column 17, key equations.q_hose" of the character at this offset in bytes.
   [[nodiscard]] std::string place(size_t offset) const;
 };
 

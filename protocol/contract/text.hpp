@@ -1,6 +1,8 @@
 #pragma once
-// Words of a text that somebody wrote: without the blanks around them, in small letters, as numbers, and quoted for a file.
+// Words of a text that somebody wrote: without the blanks around them, in small letters, as numbers, and quoted for a file;
+// its characters.
 
+#include <algorithm>
 #include <array>
 #include <cctype>
 #include <charconv>
@@ -29,6 +31,19 @@ inline std::string in_small_letters(std::string_view word) {
 inline std::string_view without_byte_order_mark(std::string_view text) {
   constexpr std::string_view mark = "\xEF\xBB\xBF";
   return text.starts_with(mark) ? text.substr(mark.size()) : text;
+}
+
+/// Of UTF-8.
+inline bool begins_character(char byte) { return (static_cast<unsigned char>(byte) & 0xC0U) != 0x80U; }
+inline size_t characters_of(std::string_view text) {
+  return static_cast<size_t>(std::count_if(text.begin(), text.end(), begins_character));
+}
+/// The whole character that begins at this offset. Precondition: one does.
+inline std::string_view character_at(std::string_view text, size_t offset) {
+  size_t end = offset + 1;
+  while (end < text.size() && !begins_character(text[end]))
+    ++end;
+  return text.substr(offset, end - offset);
 }
 
 /// The number that the whole of `text` is; "nan" and "inf" are numbers too.

@@ -95,6 +95,33 @@ TEST_F(Formulas, RefuseWhatIsNone) {
   EXPECT_FALSE(fault(std::string(20000, '1')).problem.empty());
 }
 
+TEST_F(Formulas, RefuseADivisionByWhatIsZeroWithItsPlace) {
+  for (const char* text : {"p / (2 - 2)", "p / (0 * V)", "p / 0 [s]", "p / sin(0)"}) {
+    EXPECT_EQ(fault(text).place, "line 1, column 5, key k") << text;
+    EXPECT_EQ(fault(text).problem, "divides by zero") << text;
+  }
+}
+
+TEST_F(Formulas, ShowWholeCharactersAndCountThem) {
+  EXPECT_EQ(fault("x + y½").problem, "\"½\" is not expected here");
+  EXPECT_EQ(fault("x + €").problem, "\"€\" stands where a quantity is expected");
+  EXPECT_EQ(fault("(x €").problem, "\"€\" stands where \")\" is expected");
+  EXPECT_EQ(fault("x ½ € V").place, "line 1, column 3, key k");
+}
+
+TEST_F(Formulas, NamePureNumbersByTheirUnits) {
+  EXPECT_EQ(fault("p + 5 [%]").problem, "adds kPa and %");
+  EXPECT_EQ(unit("3 [ppm]"), "ppm");
+  EXPECT_EQ(unit("90 [deg]"), "deg");
+  EXPECT_EQ(unit("p / 3 [Pa]"), "a pure number times 1000");
+}
+
+TEST_F(Formulas, BeginNamesWithALetter) {
+  EXPECT_TRUE(is_name("a_1"));
+  for (const char* text : {"", "_a", "1a", "a-b", "a½", "pi", "sin"})
+    EXPECT_FALSE(is_name(text)) << text;
+}
+
 TEST_F(Formulas, HaveTheDerivativesOfDualNumbers) {
   using Dual = ceres::Jet<double, 6>;
   using Second = ceres::Jet<Dual, 6>;

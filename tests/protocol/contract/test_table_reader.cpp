@@ -108,6 +108,22 @@ TEST(TableReader, AnUnreadableFileIsAnInputError) {
   EXPECT_THAT(message_of([] { (void)TableReader::from_file("/"); }), HasSubstr("cannot be opened"));
 }
 
+TEST(TableReader, APlaceCountsCharacters) {
+  TableReader root = reader("a = \"½ ½ x\"\nb = \"\"\"½½½½½½\n½x\"\"\"\nc = \"\"\"½½½½½½x\"\"\"");
+  const auto place_of_x = [&](const char* key) {
+    const PlacedText text = root.placed_text(key);
+    return text.place(text.text.find('x'));
+  };
+  EXPECT_EQ(place_of_x("a"), "line 1, column 10, key a");
+  EXPECT_EQ(place_of_x("b"), "line 3, column 2, key b");
+  EXPECT_EQ(place_of_x("c"), "line 4, column 14, key c");
+}
+
+TEST(TableReader, AMessageHoldsNoControlCharacters) {
+  const InputError error({"f.toml", "", "\"a\x01\x1B\x7F½\" is no id", "Write\nanother."});
+  EXPECT_STREQ(error.what(), "f.toml: \"a\\x01\\x1B\\x7F½\" is no id\n  Write\nanother.");
+}
+
 TEST(TableReader, ARunFileInPlaceOfAStudyIsTold) {
   const std::filesystem::path file = std::filesystem::temp_directory_path() / "table_reader.run.h5";
   std::ofstream(file, std::ios::binary) << "\x89HDF\r\n\x1a\n";

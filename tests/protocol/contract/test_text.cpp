@@ -28,6 +28,13 @@ TEST(Text, HoldsAsManyNumbersAsAreAskedFor) {
     EXPECT_FALSE((parse_numbers<int, 3>(other))) << other;
 }
 
+TEST(Text, HasCharactersOfSeveralBytes) {
+  EXPECT_EQ(characters_of("a½€😀"), 4U);
+  EXPECT_EQ(character_at("a½b", 1), "½");
+  EXPECT_EQ(character_at("a½", 0), "a");
+  EXPECT_EQ(character_at("½", 0), "½");
+}
+
 TEST(Text, IsQuotedForToml) { EXPECT_EQ(toml_text("a \"b\" \\ c\n"), R"("a \"b\" \\ c")"); }
 
 }  // namespace
