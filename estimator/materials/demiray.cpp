@@ -17,7 +17,7 @@ struct Demiray {
   static constexpr std::string_view name = "demiray";
   static constexpr bool needs_axes = false;
   static constexpr std::array<LawParameter, 2> parameters{
-      {{"C1_kPa", "half the shear modulus at rest", 0.0, 0.165},
+      {{"C1_kPa", "half the shear modulus at rest", 0.0, 0.165, "kPa"},
        {"beta", "stiffening with I1 - 3; 0 is neo-Hookean", -1.0, 9.242}}};
 
   template <class Scalar>

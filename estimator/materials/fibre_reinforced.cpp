@@ -20,9 +20,9 @@ struct FibreReinforced {
   static constexpr std::string_view name = "fibre-reinforced";
   static constexpr bool needs_axes = true;
   static constexpr std::array<LawParameter, 4> parameters{
-      {{"C1_kPa", "half the shear modulus of the matrix at rest", 0.0, 8.71},
+      {{"C1_kPa", "half the shear modulus of the matrix at rest", 0.0, 8.71, "kPa"},
        {"beta", "stiffening of the matrix with I1 - 3; 0 is neo-Hookean", -1.0, 2.0},
-       {"k1_kPa", "fibres: stress for I4 - 1", -1.0, 3.0},
+       {"k1_kPa", "fibres: stress for I4 - 1", -1.0, 3.0, "kPa"},
        {"k2", "stiffening of the fibres with (I4 - 1)^2", -1.0, 5.0}}};
 
   template <class Scalar>

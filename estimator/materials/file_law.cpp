@@ -1,8 +1,8 @@
 #include "estimator/materials/file_law.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -29,14 +29,17 @@ using Values = std::span<const double>;
 
 constexpr size_t most_parameters = 32;
 constexpr size_t strains = 6;  ///< inputs before the parameters: C by law.hpp's indices
+/// Inputs behind the parameters while formulas are read: the invariants, which need no axes.
+constexpr size_t first_invariant = strains + most_parameters;
 constexpr size_t tangent_entries = 21;
 
 struct Declared {
   std::string id;
-  std::vector<std::string> names, meanings;  ///< of the parameters
+  std::vector<std::string> names, meanings, units;  ///< of the parameters
   std::vector<LawParameter> parameters;
   Graph graph;
   NodeId energy = 0;
+  bool needs_axes = false;
 };
 
 class FileLaw final : public Law {
@@ -74,6 +77,7 @@ class FileLaw final : public Law {
     for (size_t i = 0; i < declared_.parameters.size(); ++i) {
       declared_.parameters[i].name = declared_.names[i];
       declared_.parameters[i].meaning = declared_.meanings[i];
+      declared_.parameters[i].unit = declared_.units[i];
     }
     Graph& graph = declared_.graph;
     energy_ = Program(graph, std::vector{declared_.energy});
@@ -86,11 +90,10 @@ class FileLaw final : public Law {
         response.push_back(graph.scaled(stress_weight(n), graph.derivative(stress[m], n)));
     stress_ = Program(graph, stress);
     response_ = Program(graph, response);
-    needs_axes_ = finds_axes();
   }
 
   std::string_view name() const override { return declared_.id; }
-  bool needs_axes() const override { return needs_axes_; }
+  bool needs_axes() const override { return declared_.needs_axes; }
   std::span<const LawParameter> parameters() const override { return declared_.parameters; }
 
   double energy(const Tensor& c, Values values) const override { return energy_(inputs(c, values).data()); }
@@ -121,28 +124,26 @@ class FileLaw final : public Law {
   }
 
  private:
-  /// Whether a body turned within its axes has another energy, at a strain without symmetry.
-  bool finds_axes() const {
-    Eigen::Matrix3d f;
-    f << 1.12, 0.08, -0.05, 0.03, 0.95, 0.11, -0.04, 0.06, 1.02;
-    std::vector<double> typical;
-    for (const LawParameter& parameter : declared_.parameters)
-      typical.push_back(parameter.typical);
-    const auto energy_of = [&](const Eigen::Matrix3d& g) {
-      return energy(symmetric_part(g.transpose() * g), typical);
-    };
-    const double still = energy_of(f);
-    for (int axis = 0; axis < 3; ++axis) {
-      const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7, Eigen::Vector3d::Unit(axis)).toRotationMatrix();
-      if (std::abs(energy_of(f * turn) - still) > 1e-9 * std::abs(still)) return true;
-    }
-    return false;
-  }
-
   Declared declared_;
   Program energy_, stress_, response_;
-  bool needs_axes_ = false;
 };
+
+/// I1, I2, I3 of C.
+std::array<NodeId, 3> invariants_of(Graph& graph) {
+  std::array<NodeId, strains> c{};
+  for (size_t m = 0; m < strains; ++m)
+    c[m] = graph.input(m);
+  const auto square = [&](size_t m) { return graph.product(c[m], c[m]); };
+  const auto less = [&](NodeId a, NodeId b) { return graph.make(Operation::subtract, a, b); };
+  const NodeId minor_ff = less(graph.product(c[1], c[2]), square(4));
+  const NodeId minor_ss = less(graph.product(c[2], c[0]), square(5));
+  const NodeId minor_nn = less(graph.product(c[0], c[1]), square(3));
+  const NodeId minor_fs = less(graph.product(c[3], c[2]), graph.product(c[4], c[5]));
+  const NodeId minor_nf = less(graph.product(c[3], c[4]), graph.product(c[1], c[5]));
+  return {graph.sum(graph.sum(c[0], c[1]), c[2]), graph.sum(graph.sum(minor_ff, minor_ss), minor_nn),
+          graph.sum(less(graph.product(c[0], minor_ff), graph.product(c[3], minor_fs)),
+                    graph.product(c[5], minor_nf))};
+}
 
 /// The names of C, E and their invariants.
 expressions::Scope strain_names(Graph& graph) {
@@ -163,30 +164,88 @@ expressions::Scope strain_names(Graph& graph) {
          c[m]);
   }
   name("lambda_f", graph.make(Operation::root, c[0]));
-  const auto square = [&](size_t m) { return graph.product(c[m], c[m]); };
-  const auto less = [&](NodeId a, NodeId b) { return graph.make(Operation::subtract, a, b); };
-  const NodeId minor_ff = less(graph.product(c[1], c[2]), square(4));
-  const NodeId minor_ss = less(graph.product(c[2], c[0]), square(5));
-  const NodeId minor_nn = less(graph.product(c[0], c[1]), square(3));
-  name("I1", graph.sum(graph.sum(c[0], c[1]), c[2]));
-  name("I2", graph.sum(graph.sum(minor_ff, minor_ss), minor_nn));
-  const NodeId minor_fs = less(graph.product(c[3], c[2]), graph.product(c[4], c[5]));
-  const NodeId minor_nf = less(graph.product(c[3], c[4]), graph.product(c[1], c[5]));
-  name("I3", graph.sum(less(graph.product(c[0], minor_ff), graph.product(c[3], minor_fs)),
-                       graph.product(c[5], minor_nf)));
+  for (size_t i = 0; i < 3; ++i)
+    name(fmt::format("I{}", i + 1), graph.input(first_invariant + i));
   return scope;
+}
+
+/// Whether the energy reads a direction is seen before invariants are what they are of C.
+void put_invariants_in(Declared& law) {
+  for (size_t m = 0; m < strains; ++m)
+    law.needs_axes = law.needs_axes || law.graph.depends_on(law.energy, m);
+  const std::array<NodeId, 3> invariants = invariants_of(law.graph);
+  for (size_t i = 0; i < 3; ++i)
+    law.energy = law.graph.substituted(law.energy, first_invariant + i, invariants[i]);
+}
+
+/// Of C, by 5 % and at a constant volume: stretches along each axis and shears in each plane, both ways.
+std::vector<Tensor> small_distortions() {
+  std::vector<Tensor> all;
+  for (const double by : {0.05, -0.05}) {
+    for (size_t m = 0; m < strains; ++m) {
+      Tensor& c = all.emplace_back(undeformed);
+      const auto [i, j] = symmetric_entries[m];
+      if (i == j) {
+        c = {1.0 / (1.0 + by), 1.0 / (1.0 + by), 1.0 / (1.0 + by), 0.0, 0.0, 0.0};
+        c[m] = (1.0 + by) * (1.0 + by);
+      } else {
+        c[j] += by * by;
+        c[m] = by;
+      }
+    }
+  }
+  return all;
+}
+
+/// Refuses, at typical values, what no body can be made of.
+void require_rest(const Law& law, const PlacedText& energy) {
+  const auto fail = [&](std::string problem, std::string remedy) {
+    throw InputError({energy.file, energy.place(0), std::move(problem), std::move(remedy)});
+  };
+  std::vector<double> typical;
+  for (const LawParameter& parameter : law.parameters())
+    typical.push_back(parameter.typical);
+  const double at_rest = law.energy(undeformed, typical);
+  const MaterialResponse rest = law.response(undeformed, typical);
+  const auto is_finite = [](double value) { return std::isfinite(value); };
+  if (!std::isfinite(at_rest) || !std::ranges::all_of(rest.stress, is_finite) || !rest.tangent.allFinite())
+    fail("is not finite at rest, or its stress or tangent is not",
+         "At rest C is the unit tensor: I1 - 3 is 0, which has no inverse, no logarithm and a root without a "
+         "slope.");
+  const double pressure = law.rest_pressure_kPa(typical);
+  const double scale = std::abs(pressure) + rest.tangent.norm();
+  for (size_t m = 0; m < strains; ++m)
+    if (std::abs(rest.stress[m] - (m < 3 ? pressure : 0.0)) > 1e-9 * scale)
+      fail(fmt::format("at rest its stress is no pressure: {:.4g} kPa (ff, ss, nn, fs, sn, nf)",
+                       fmt::join(rest.stress, ", ")),
+           "The solver balances a pressure alone: count strains from rest, as in (I4f - 1)^2.");
+  double most = 0.0, least = 0.0;
+  for (const Tensor& c : small_distortions()) {
+    const double cost = law.energy(c, typical) - at_rest;
+    most = std::max(most, cost);
+    least = std::min(least, cost);
+  }
+  const double rounding = 1e-12 * scale;
+  if (least < -rounding || most <= rounding)
+    fail(
+        least < -rounding ? "falls where the body is distorted" : "costs nothing where the body is distorted",
+        "A stretch or shear of 5 % must need energy: check the signs, and that it depends on more than I3.");
 }
 
 void read_parameter(TableReader& table, expressions::Scope& scope, Declared& law) {
   const std::string name = table.text("name");
   if (!expressions::is_name(name) || scope.names.contains(name))
     table.fail("name", fmt::format("\"{}\" cannot be a parameter's name", name),
-               "Write letters, digits and _ that have no meaning in formulas yet.");
+               "Write a letter, then letters, digits and _, that have no meaning in formulas yet.");
   const std::string written = table.text_or("unit", "1");
   const auto unit = expressions::parse_unit(written);
   if (!unit)
     table.fail("unit", fmt::format("\"{}\" is no unit that is known", written),
                "Write for example \"kPa\" or \"1\".");
+  const bool is_pressure = unit->same_dimension(*expressions::parse_unit("kPa"));
+  if (is_pressure && expressions::factor_between(*unit, *expressions::parse_unit("kPa")) != 1.0)
+    table.fail("unit", fmt::format("\"{}\" is no unit of a law's stiffness", written),
+               "Write \"kPa\", and the numbers so.");
   const std::vector<double> bounds = table.numbers("bounds", 2);
   if (!(bounds[0] < bounds[1]))
     table.fail("bounds", fmt::format("[{}, {}] is not an interval", bounds[0], bounds[1]),
@@ -194,15 +253,28 @@ void read_parameter(TableReader& table, expressions::Scope& scope, Declared& law
   const double typical = table.number("typical", {.above = bounds[0], .at_most = bounds[1]});
   law.names.push_back(name);
   law.meanings.push_back(table.text_or("meaning", ""));
+  law.units.push_back(is_pressure ? "kPa" : written);
   scope.names[name] = {law.graph.input(strains + law.parameters.size()), *unit};
-  law.parameters.push_back({.name = {}, .meaning = {}, .above = bounds[0], .typical = typical});
+  law.parameters.push_back(
+      {.name = {}, .meaning = {}, .above = bounds[0], .typical = typical, .unit = {}, .at_most = bounds[1]});
   table.finish();
+}
+
+std::unique_ptr<const Law> made_law(Declared law, const PlacedText& energy) {
+  try {
+    put_invariants_in(law);
+    return std::make_unique<FileLaw>(std::move(law));
+  } catch (const std::exception& error) {
+    throw InputError({energy.file, energy.place(0), error.what(), "Simplify the energy."});
+  }
 }
 
 std::unique_ptr<const Law> read_law(TableReader root) {
   root.expect_format("diastole-law", 1);
   Declared law;
-  law.id = root.text("id");
+  law.id = expressions::read_id(root);
+  if (find_law(law.id) != nullptr)
+    root.fail("id", fmt::format("\"{}\" is a built-in law", law.id), "Give yours another name.");
   root.text_or("title", "");
   root.text_or("source", "");
   expressions::Scope scope = strain_names(law.graph);
@@ -224,11 +296,13 @@ std::unique_ptr<const Law> read_law(TableReader root) {
   law.energy =
       expressions::parse_formula_in(energy, scope, law.graph, *expressions::parse_unit("kPa"), "energy_kPa");
   root.finish();
-  try {
-    return std::make_unique<FileLaw>(std::move(law));
-  } catch (const std::exception& error) {
-    throw InputError({energy.file, energy.place(0), error.what(), "Simplify the energy."});
-  }
+  for (size_t i = 0; i < parameters.size(); ++i)
+    if (!law.graph.depends_on(law.energy, strains + i))
+      parameters[i].fail("name", fmt::format("the energy does not depend on {}", law.names[i]),
+                         "Remove the parameter, or use it.");
+  std::unique_ptr<const Law> made = made_law(std::move(law), energy);
+  require_rest(*made, energy);
+  return made;
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 //   Cff Css Cnn Cfs Csn Cnf, Eff ...   C and E = (C - I)/2 in fibre, sheet, normal; r stands for n (the paper's Eq. 5)
 //   I4f I4s I4n I8fs I8sn I8nf         the same as Cff, Css, ...
 //   lambda_f              stretch along the fibre
+//
+// A law whose energy reads more than the invariants needs axes, whatever the values of its parameters.
 
 #include <filesystem>
 #include <memory>
@@ -15,7 +17,8 @@
 
 namespace diastole {
 
-/// Throws InputError with file, line, column, what is wrong and what to change.
+/// Throws InputError with file, line, column, what is wrong and what to change: also where the law, its stress or its tangent is
+/// not finite at rest, its stress there is no pressure, or a small distortion needs no energy.
 std::unique_ptr<const Law> read_law_file(const std::filesystem::path& path);
 std::unique_ptr<const Law> read_law_text(std::string_view text, std::string name);
 

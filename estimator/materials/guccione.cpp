@@ -44,7 +44,7 @@ struct Guccione {
   static constexpr std::string_view name = "guccione";
   static constexpr bool needs_axes = true;
   static constexpr std::array<LawParameter, 4> parameters{
-      {{"C_kPa", "stress scale: W = C/2 (exp Q - 1)", 0.0, 1.2},
+      {{"C_kPa", "stress scale: W = C/2 (exp Q - 1)", 0.0, 1.2, "kPa"},
        {"b1", "stiffness along the fibre (Land's bf)", 0.0, 26.7},
        {"b2", "stiffness across the fibre (Land's bt)", 0.0, 2.0},
        {"b3", "stiffness in shear along the fibre (Land's bfs)", 0.0, 14.7}}};

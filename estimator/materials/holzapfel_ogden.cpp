@@ -20,14 +20,15 @@ namespace {
 struct HolzapfelOgden {
   static constexpr std::string_view name = "holzapfel-ogden";
   static constexpr bool needs_axes = true;
-  static constexpr std::array<LawParameter, 8> parameters{{{"a_kPa", "matrix", 0.0, 0.059},
-                                                           {"b", "stiffening of the matrix", 0.0, 8.023},
-                                                           {"af_kPa", "fibres", 0.0, 18.472},
-                                                           {"bf", "stiffening of the fibres", 0.0, 16.026},
-                                                           {"as_kPa", "sheets", 0.0, 2.481},
-                                                           {"bs", "stiffening of the sheets", 0.0, 11.120},
-                                                           {"afs_kPa", "coupling in shear", 0.0, 0.216},
-                                                           {"bfs", "stiffening of it", 0.0, 11.436}}};
+  static constexpr std::array<LawParameter, 8> parameters{
+      {{"a_kPa", "matrix", 0.0, 0.059, "kPa"},
+       {"b", "stiffening of the matrix", 0.0, 8.023},
+       {"af_kPa", "fibres", 0.0, 18.472, "kPa"},
+       {"bf", "stiffening of the fibres", 0.0, 16.026},
+       {"as_kPa", "sheets", 0.0, 2.481, "kPa"},
+       {"bs", "stiffening of the sheets", 0.0, 11.120},
+       {"afs_kPa", "coupling in shear", 0.0, 0.216, "kPa"},
+       {"bfs", "stiffening of it", 0.0, 11.436}}};
 
   template <class Scalar>
   static Scalar energy(const SymmetricTensor<Scalar>& c, const std::array<Scalar, 8>& values) {

@@ -15,6 +15,7 @@
 #include <Eigen/Dense>
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -65,10 +66,15 @@ inline SymmetricTensor<double> symmetric_part(const Eigen::Matrix3d& a) {
 
 /// One parameter of a law, as it is spelled in a study file.
 struct LawParameter {
-  std::string_view name;     ///< with unit: "C1_kPa"
-  std::string_view meaning;  ///< for help and reports
-  double above;              ///< values must exceed this
-  double typical;            ///< a soft gel's or heart's; where the tests evaluate the law
+  std::string_view name;        ///< a built-in law's with its unit: "C1_kPa"
+  std::string_view meaning;     ///< for help and reports
+  double above;                 ///< values must exceed this
+  double typical;               ///< a soft gel's or heart's; where the tests evaluate the law
+  std::string_view unit = "1";  ///< pressures are in kPa
+  double at_most = std::numeric_limits<double>::infinity();
+
+  /// All of a law's moduli times a number are its stress times that number.
+  [[nodiscard]] bool is_modulus() const { return unit == "kPa"; }
 };
 
 struct MaterialResponse {

@@ -16,7 +16,8 @@ struct MooneyRivlin {
   static constexpr std::string_view name = "mooney-rivlin";
   static constexpr bool needs_axes = false;
   static constexpr std::array<LawParameter, 2> parameters{
-      {{"C1_kPa", "multiplies I1 - 3", 0.0, 170.0}, {"C2_kPa", "multiplies I2 - 3", 0.0, 20.0}}};
+      {{"C1_kPa", "multiplies I1 - 3", 0.0, 170.0, "kPa"},
+       {"C2_kPa", "multiplies I2 - 3", 0.0, 20.0, "kPa"}}};
 
   template <class Scalar>
   static Scalar energy(const SymmetricTensor<Scalar>& c, const std::array<Scalar, 2>& values) {

@@ -13,7 +13,7 @@ struct NeoHookean {
   static constexpr std::string_view name = "neo-hookean";
   static constexpr bool needs_axes = false;
   static constexpr std::array<LawParameter, 1> parameters{
-      {{"C1_kPa", "half the shear modulus: W = C1 (I1 - 3)", 0.0, 8.71}}};
+      {{"C1_kPa", "half the shear modulus: W = C1 (I1 - 3)", 0.0, 8.71, "kPa"}}};
 
   template <class Scalar>
   static Scalar energy(const SymmetricTensor<Scalar>& c, const std::array<Scalar, 1>& values) {

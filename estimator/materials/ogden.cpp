@@ -54,11 +54,11 @@ struct Ogden {
   static constexpr bool needs_axes = false;
   static constexpr double any = -1e300;
   static constexpr std::array<LawParameter, 6> parameters{
-      {{"mu1_kPa", "first modulus", any, 630.0},
+      {{"mu1_kPa", "first modulus", any, 630.0, "kPa"},
        {"alpha1", "its exponent; mu1 alpha1 > 0 is stable", any, 1.3},
-       {"mu2_kPa", "second modulus", any, 1.2},
+       {"mu2_kPa", "second modulus", any, 1.2, "kPa"},
        {"alpha2", "its exponent", any, 5.0},
-       {"mu3_kPa", "third modulus", any, -10.0},
+       {"mu3_kPa", "third modulus", any, -10.0, "kPa"},
        {"alpha3", "its exponent", any, -2.0}}};
 
   template <class Scalar>

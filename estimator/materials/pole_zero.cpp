@@ -26,22 +26,22 @@ struct PoleZero {
   static constexpr bool needs_axes = true;
   // One row for each strain component, in the order of law.hpp.
   static constexpr std::array<LawParameter, 18> parameters{
-      {{"kff_kPa", "fibre stiffness", 0.0, 2.0},
+      {{"kff_kPa", "fibre stiffness", 0.0, 2.0, "kPa"},
        {"aff", "fibre strain limit", 0.0, 0.475},
        {"bff", "curvature towards it", 0.0, 1.5},
-       {"kss_kPa", "sheet stiffness", 0.0, 2.0},
+       {"kss_kPa", "sheet stiffness", 0.0, 2.0, "kPa"},
        {"ass", "sheet strain limit", 0.0, 0.619},
        {"bss", "curvature towards it", 0.0, 1.5},
-       {"knn_kPa", "sheet-normal stiffness", 0.0, 2.0},
+       {"knn_kPa", "sheet-normal stiffness", 0.0, 2.0, "kPa"},
        {"ann", "sheet-normal strain limit", 0.0, 0.943},
        {"bnn", "curvature towards it", 0.0, 0.442},
-       {"kfs_kPa", "fibre-sheet shear stiffness", 0.0, 1.0},
+       {"kfs_kPa", "fibre-sheet shear stiffness", 0.0, 1.0, "kPa"},
        {"afs", "fibre-sheet shear strain limit", 0.0, 0.8},
        {"bfs", "curvature towards it", 0.0, 1.2},
-       {"ksn_kPa", "sheet-normal shear stiffness", 0.0, 1.0},
+       {"ksn_kPa", "sheet-normal shear stiffness", 0.0, 1.0, "kPa"},
        {"asn", "sheet-normal shear strain limit", 0.0, 0.8},
        {"bsn", "curvature towards it", 0.0, 1.2},
-       {"kfn_kPa", "fibre-normal shear stiffness", 0.0, 1.0},
+       {"kfn_kPa", "fibre-normal shear stiffness", 0.0, 1.0, "kPa"},
        {"afn", "fibre-normal shear strain limit", 0.0, 0.8},
        {"bfn", "curvature towards it", 0.0, 1.2}}};
 

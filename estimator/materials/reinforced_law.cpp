@@ -65,10 +65,10 @@ class ReinforcedLaw final : public Law {
       : base_(base),
         name_("reinforced-" + std::string(base.name())),
         parameters_(base.parameters().begin(), base.parameters().end()) {
-    parameters_.push_back({"added_k1_kPa", "added fibres: stress for I4 - 1", -1e3, 3.0});
+    parameters_.push_back({"added_k1_kPa", "added fibres: stress for I4 - 1", -1e3, 3.0, "kPa"});
     parameters_.push_back({"added_k2", "stiffening of the added fibres with (I4 - 1)^2", -1.0, 5.0});
     parameters_.push_back(
-        {"added_angle_deg", "of the added fibres, from the first material axis", -1e3, 15.0});
+        {"added_angle_deg", "of the added fibres, from the first material axis", -1e3, 15.0, "deg"});
   }
 
   std::string_view name() const override { return name_; }

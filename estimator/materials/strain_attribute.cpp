@@ -31,11 +31,11 @@ struct StrainAttribute {
   static constexpr std::string_view name = "strain-attribute";
   static constexpr bool needs_axes = true;
   static constexpr std::array<LawParameter, 6> parameters{
-      {{"k2_kPa", "Young's modulus along the fibre at rest", 0.0, 33.2},
+      {{"k2_kPa", "Young's modulus along the fibre at rest", 0.0, 33.2, "kPa"},
        {"m2", "stiffening with fibre stretch", 0.0, 27.7},
-       {"k3_kPa", "four times the shear modulus across the fibre", 0.0, 4.8},
+       {"k3_kPa", "four times the shear modulus across the fibre", 0.0, 4.8, "kPa"},
        {"m3", "stiffening with cross-fibre shear", 0.0, 4.0},
-       {"k4_kPa", "shear modulus along the fibre", 0.0, 8.8},
+       {"k4_kPa", "shear modulus along the fibre", 0.0, 8.8, "kPa"},
        {"m4", "stiffening with shear along the fibre", 0.0, 7.4}}};
 
   template <class Scalar>

@@ -12,7 +12,8 @@ struct Dummy {
   static constexpr std::string_view name = "dummy";
   static constexpr bool needs_axes = false;
   static constexpr std::array<LawParameter, 2> parameters{
-      {{"C1_kPa", "half the shear modulus at rest", 0.0, 5.0}, {"C2_kPa", "stiffening", 0.0, 1.0}}};
+      {{"C1_kPa", "half the shear modulus at rest", 0.0, 5.0, "kPa"},
+       {"C2_kPa", "stiffening", 0.0, 1.0, "kPa"}}};
 
   template <class Scalar>
   static Scalar energy(const SymmetricTensor<Scalar>& c, const std::array<Scalar, 2>& values) {

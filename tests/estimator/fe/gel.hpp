@@ -54,7 +54,7 @@ struct FibreExponential {
   static constexpr std::string_view name = "test-fibre-exponential";
   static constexpr bool needs_axes = true;
   static constexpr std::array<LawParameter, 2> parameters{
-      {{"C_kPa", "scale", 0.0, 3.0}, {"b", "exponent", 0.0, 2.0}}};
+      {{"C_kPa", "scale", 0.0, 3.0, "kPa"}, {"b", "exponent", 0.0, 2.0}}};
   template <class Scalar>
   static Scalar energy(const SymmetricTensor<Scalar>& c, const std::array<Scalar, 2>& values) {
     using std::exp;

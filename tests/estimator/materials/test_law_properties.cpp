@@ -94,7 +94,9 @@ TEST_P(EveryLaw, TangentIsTheStresssDerivativeAndSymmetric) {
 TEST_P(EveryLaw, NeedsAxesIfTurningTheMaterialChangesTheEnergy) {
   double change = 0.0;
   double most = 0.0;
-  for (const Eigen::Matrix3d& f : deformations()) {
+  std::vector<Eigen::Matrix3d> all = deformations();
+  all.emplace_back(Eigen::Vector3d(1.3, 1.0 / std::sqrt(1.3), 1.0 / std::sqrt(1.3)).asDiagonal());
+  for (const Eigen::Matrix3d& f : all) {
     const double energy = law.energy(right_cauchy_green(f), values);
     most = std::max(most, std::abs(energy));
     for (int axis = 0; axis < 3; ++axis) {
@@ -146,6 +148,17 @@ TEST_P(EveryLaw, SensitivityIsTheStresssParameterDerivative) {
             << law.parameters()[i].name << ", entry " << m;
       }
     }
+  }
+}
+
+TEST_P(EveryLaw, StressIsProportionalToAllModuliTogether) {
+  std::vector<double> stiffer = values;
+  for (size_t i = 0; i < values.size(); ++i)
+    if (law.parameters()[i].is_modulus()) stiffer[i] *= 3.0;
+  for (const Eigen::Matrix3d& f : deformations()) {
+    const Tensor c = right_cauchy_green(f);
+    for (size_t m = 0; m < 6; ++m)
+      EXPECT_NEAR(law.stress(c, stiffer)[m], 3.0 * law.stress(c, values)[m], 1e-12 * stiffness_kPa(c));
   }
 }
 
@@ -213,6 +226,34 @@ std::vector<const Law*> laws_of_files() {
 }
 
 INSTANTIATE_TEST_SUITE_P(Files, EveryLaw, ::testing::ValuesIn(laws_of_files()), test_name);
+
+/// Fibres that bear nothing at the strains of most of these tests.
+const Law& recruited_fibres() {
+  static const std::unique_ptr<const Law> law = read_law_text(R"toml(
+format = "diastole-law"
+version = 1
+id = "my-recruited-fibres"
+energy_kPa = "c * (I1 - 3) + if(lambda_f > straight, k * (lambda_f - straight)^2, 0)"
+[[parameter]]
+name = "c"
+unit = "kPa"
+bounds = [0, 100]
+typical = 3
+[[parameter]]
+name = "k"
+unit = "kPa"
+bounds = [0, 500]
+typical = 40
+[[parameter]]
+name = "straight"
+bounds = [1, 1.6]
+typical = 1.22
+)toml",
+                                                              "my-recruited-fibres.law.toml");
+  return *law;
+}
+
+INSTANTIATE_TEST_SUITE_P(OfLargeStrains, EveryLaw, ::testing::Values(&recruited_fibres()), test_name);
 
 INSTANTIATE_TEST_SUITE_P(Reinforced, EveryLaw,
                          ::testing::Values(&reinforced(*find_law("guccione")),
