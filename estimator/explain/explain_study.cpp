@@ -7,6 +7,7 @@
 #include "estimator/effects/effect.hpp"
 #include "estimator/explain/imaging/explain_field.hpp"
 #include "estimator/explain/verdict/verdict.hpp"
+#include "estimator/model/study_model.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole::explain {
@@ -70,7 +71,7 @@ Study with_imaged_modulus(Study study, const Explanation& field) {
   if (study.law.parameters.empty()) return study;
   StudyParameter& modulus = study.law.parameters.front();
   const auto seen = std::ranges::find(field.law, modulus.name, &ParameterShift::name);
-  if (seen == field.law.end() || !modulus.name.ends_with("_kPa") || !(seen->after > 0.0)) return study;
+  if (seen == field.law.end() || !is_modulus(study, modulus) || !(seen->after > 0.0)) return study;
   // A uniform distribution over the bounds has the standard deviation that is known.
   const double reach = std::exp(std::sqrt(3.0) * std::hypot(seen->after_error / seen->after, beside_the_fit));
   if (!(reach * reach < modulus.upper / modulus.lower)) return study;

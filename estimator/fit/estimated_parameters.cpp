@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <utility>
 
 #include "protocol/contract/input_error.hpp"
 
@@ -34,17 +35,22 @@ EstimatedParameters estimated_parameters(const Study& study, const ElasticModel&
   EstimatedParameters estimated;
   for (const StudyParameter& parameter : study.law.parameters) {
     const size_t index = model.law().parameter_index(parameter.name);
-    const double above = model.law().parameters()[index].above;
-    if (!(parameter.lower > above)) {
+    const LawParameter& of_law = model.law().parameters()[index];
+    const auto refuse_bounds = [&](std::string problem, std::string remedy) {
       throw InputError({study.file.string(), fmt::format("key law.parameters.{}.bounds", parameter.name),
-                        fmt::format("the lower bound {} is not above {}", parameter.lower, above),
-                        "Choose a larger lower bound: the law has no meaning there."});
-    }
+                        std::move(problem), std::move(remedy)});
+    };
+    if (!(parameter.lower > of_law.above))
+      refuse_bounds(fmt::format("the lower bound {} is not above {}", parameter.lower, of_law.above),
+                    "Choose a larger lower bound: the law has no meaning there.");
+    if (parameter.upper > of_law.at_most)
+      refuse_bounds(fmt::format("the upper bound {} is above {}", parameter.upper, of_law.at_most),
+                    "Choose a smaller upper bound, or widen the bounds in the law's file.");
     const std::vector<ParameterGroup> groups = parameter.vary == Variation::whole
                                                    ? std::vector{whole_parameter(index)}
                                                    : each_element(index, model.mesh().element_count());
     const size_t first = estimated.values.size();
-    estimated.runs.push_back({parameter, first, groups.size()});
+    estimated.runs.push_back({parameter, first, groups.size(), of_law.is_modulus()});
     const Smoothness& smoothness = parameter.smoothness;
     if (parameter.vary == Variation::element && smoothness.kind != Smoothness::Kind::none) {
       const bool given = smoothness.kind == Smoothness::Kind::given;

@@ -14,6 +14,7 @@ struct ParameterRun {
   StudyParameter parameter;
   size_t first;
   size_t count;
+  bool is_modulus;  ///< LawParameter's
 
   [[nodiscard]] double mean(const Eigen::VectorXd& values) const {
     return values.segment(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(count)).mean();
@@ -34,7 +35,7 @@ struct EstimatedParameters {
   [[nodiscard]] std::vector<double> se_percent(const Eigen::MatrixXd& covariance) const;
 };
 
-/// Throws InputError when a lower bound is not a value that the law allows.
+/// Throws InputError when bounds reach beyond the law's.
 EstimatedParameters estimated_parameters(const Study& study, const ElasticModel& model);
 
 }  // namespace diastole

@@ -46,7 +46,7 @@ std::string data_words(const Measurement& measurement) {
 }
 
 FittedParameter record_of(const ParameterRun& run, const FitOutcome& fit) {
-  const auto& [parameter, first, count] = run;
+  const auto& [parameter, first, count, is_modulus] = run;
   FittedParameter result{.name = parameter.name,
                          .value = fit.values[first].value,
                          .se = fit.values[first].se,
@@ -134,7 +134,7 @@ std::vector<size_t> whole_values(const EstimatedParameters& estimated) {
 }
 
 void take_start(EstimatedParameters& estimated, const FitRecord& start, const std::string& file) {
-  for (const auto& [parameter, first, count] : estimated.runs) {
+  for (const auto& [parameter, first, count, is_modulus] : estimated.runs) {
     const auto found = std::ranges::find(start.parameters, parameter.name, &FittedParameter::name);
     if (found == start.parameters.end() ||
         (found->elements.size() > 1 && count > 1 && found->elements.size() != count)) {
@@ -170,8 +170,8 @@ FitRecord head_of(const Study& study, const Measurement& measurement) {
 bool stiffen(EstimatedParameters& estimated) {
   constexpr double factor = 3.0;
   bool changed = false;
-  for (const auto& [parameter, first, count] : estimated.runs) {
-    for (size_t i = first; parameter.name.ends_with("_kPa") && i < first + count; ++i) {
+  for (const auto& [parameter, first, count, is_modulus] : estimated.runs) {
+    for (size_t i = first; is_modulus && i < first + count; ++i) {
       EstimatedParameter& value = estimated.values[i];
       const double stiffer = std::clamp(factor * value.start, value.lower, value.upper);
       changed = changed || stiffer > value.start;
@@ -184,7 +184,7 @@ bool stiffen(EstimatedParameters& estimated) {
 std::string start_words(const EstimatedParameters& estimated) {
   std::string words;
   for (const ParameterRun& run : estimated.runs) {
-    if (run.parameter.name.ends_with("_kPa"))
+    if (run.is_modulus)
       words += fmt::format("{}{} = {:.4g}", words.empty() ? "" : ", ", run.parameter.name,
                            estimated.values[run.first].start);
   }
@@ -197,7 +197,7 @@ FitRecord checkpoint_of(FitRecord record, const inference::SearchStep& step,
   record.reason = fmt::format("Checkpoint after iteration {}.", step.iteration);
   record.iterations = step.iteration;
   for (const ParameterRun& run : estimated.runs) {
-    const auto& [parameter, first, count] = run;
+    const auto& [parameter, first, count, is_modulus] = run;
     FittedParameter& reached = record.parameters.emplace_back();
     reached.name = parameter.name;
     reached.value = run.mean(step.q);

@@ -75,7 +75,8 @@ class LawProblem final : public inference::LeastSquaresProblem {
       const LawParameter& parameter = law.parameters()[i];
       const double lower =
           parameter.above > no_bound ? parameter.above / units_[i] + beyond_the_bound : -farthest;
-      parameters.push_back({std::string(parameter.name), {}, lower, farthest});
+      const double upper = std::min(farthest, parameter.at_most / units_[i]);
+      parameters.push_back({std::string(parameter.name), {}, lower, upper});
     }
     space_ = inference::ParameterSpace(std::move(parameters));
   }
@@ -112,8 +113,6 @@ class LawProblem final : public inference::LeastSquaresProblem {
   VectorXd measured_;
 };
 
-bool is_modulus(const LawParameter& parameter) { return parameter.name.ends_with("_kPa"); }
-
 /// By what the moduli must be multiplied so that each column's predictions are as large as its measurements, on average; none
 /// if the law has no answer here.
 std::optional<double> stiffer_by(const Law& law, const std::vector<double>& values,
@@ -142,17 +141,17 @@ std::optional<double> stiffer_by(const Law& law, const std::vector<double>& valu
 /// several minima, and moduli as stiff as the specimen.
 std::vector<std::vector<double>> starts_of(const Law& law, std::span<const BenchTest> tests) {
   const auto parameters = law.parameters();
-  const bool has_exponents = !std::ranges::all_of(parameters, is_modulus);
+  const bool has_exponents = !std::ranges::all_of(parameters, &LawParameter::is_modulus);
   std::vector<std::vector<double>> starts;
   for (const double times : {1.0, 0.3, 0.1, 0.03, 3.0}) {
     if (!has_exponents && !starts.empty()) break;
     std::vector<double> values;
     for (const LawParameter& parameter : parameters)
-      values.push_back(parameter.typical * (is_modulus(parameter) ? 1 : times));
+      values.push_back(parameter.typical * (parameter.is_modulus() ? 1 : times));
     const auto factor = stiffer_by(law, values, tests);
     if (!factor) continue;
     for (size_t i = 0; i < values.size(); ++i)
-      values[i] *= is_modulus(parameters[i]) ? *factor : 1;
+      values[i] *= parameters[i].is_modulus() ? *factor : 1;
     starts.push_back(std::move(values));
   }
   return starts;
@@ -235,12 +234,14 @@ void set_estimate(LawFit& fit, const LawProblem& problem, const inference::Searc
   for (Index i = 0; i < found.q.size(); ++i) {
     const auto at = static_cast<size_t>(i);
     const double se = sd * std::sqrt(covariance(i, i)) * problem.unit(at);
-    const double above = fit.law->parameters()[at].above;
-    const double lower = above > no_bound ? above : -std::numeric_limits<double>::infinity();
-    fit.parameters.push_back({std::string(fit.law->parameters()[at].name),
+    const LawParameter& parameter = fit.law->parameters()[at];
+    const double lower =
+        parameter.above > no_bound ? parameter.above : -std::numeric_limits<double>::infinity();
+    fit.parameters.push_back({std::string(parameter.name),
                               values[at],
                               se,
-                              {std::max(lower, values[at] - quantile * se), values[at] + quantile * se},
+                              {std::max(lower, values[at] - quantile * se),
+                               std::min(parameter.at_most, values[at] + quantile * se)},
                               problem.space().bound_under(found.q, i)});
   }
   find_undetermined(fit, found.jacobian, found.q, is_free, sd);
@@ -292,9 +293,10 @@ double following(const LawFit& fit, std::span<const BenchTest> tests) {
 void remark(LawFit& fit, std::span<const BenchTest> tests) {
   for (const LawParameterEstimate& parameter : fit.parameters) {
     if (parameter.bound == inference::BoundSide::none) continue;
-    fit.remarks.push_back(
-        fmt::format("{} rests on its bound, {:.3g}: these data ask for no such term, or for less than none.",
-                    parameter.name, parameter.value));
+    const bool is_upper = parameter.bound == inference::BoundSide::upper;
+    fit.remarks.push_back(fmt::format("{} rests on its bound, {:.3g}: these data ask for {}.", parameter.name,
+                                      parameter.value,
+                                      is_upper ? "more" : "no such term, or for less than none"));
   }
   const bool scattered = fit.error_percent > 100 * rounding;
   if (scattered && following(fit, tests) > strong_doubt) {

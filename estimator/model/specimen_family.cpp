@@ -89,8 +89,6 @@ void keep_curve(const std::string& key, const SpecimenCurve& curve) {
   write_cached(file_of(key), json_text(kept_format.document({{"key", key}, {"points", points}})) + "\n");
 }
 
-bool is_modulus(const StudyParameter& parameter) { return parameter.name.ends_with("_kPa"); }
-
 }  // namespace
 
 SpecimenFamily::SpecimenFamily(Study study, const SpecimenResolution& resolution)
@@ -98,16 +96,20 @@ SpecimenFamily::SpecimenFamily(Study study, const SpecimenResolution& resolution
   require_shape_without_load(study_, "pressure-volume curves");
   study_.effects.clear();
   std::vector<StudyParameter>& parameters = study_.law.parameters;
-  while (modulus_index_ < parameters.size() && !is_modulus(parameters[modulus_index_]))
+  while (modulus_index_ < parameters.size() && !is_modulus(study_, parameters[modulus_index_]))
     ++modulus_index_;
   if (modulus_index_ == parameters.size()) {
     throw InputError({study_.file.string(), "law",
                       fmt::format("{} has no modulus in kPa that could be sought", study_.law.name),
-                      "Use a law whose first parameter is a stiffness, such as neo-hookean."});
+                      "Use a law with a parameter whose unit is kPa, such as neo-hookean."});
   }
   modulus_kPa_ = parameters[modulus_index_].start;
+  if (study_.law.file) {
+    solved_at_kPa_ = modulus_kPa_;  // the file's bounds need not hold 1 kPa
+    return;
+  }
   for (StudyParameter& parameter : parameters)
-    if (is_modulus(parameter)) parameter.start /= modulus_kPa_;
+    if (is_modulus(study_, parameter)) parameter.start /= modulus_kPa_;
 }
 
 SpecimenResolution SpecimenResolution::reaching(double volume_mL) const {
@@ -126,6 +128,10 @@ SpecimenCurve SpecimenFamily::compute(const Study& study, size_t stride) const {
   points.pop_back();  // rest, which begins both
   const size_t points_inflated = resolution_.points_inflated / stride;
   follow(study, spacing_mL * static_cast<double>(points_inflated), points_inflated, points);
+  for (SpecimenCurve::Point& at : points) {
+    at.pressure_kPa /= solved_at_kPa_;
+    at.stiffness_kPa_per_mL /= solved_at_kPa_;
+  }
   return SpecimenCurve(std::move(points));
 }
 

@@ -92,6 +92,7 @@ class SpecimenFamily final : public SpecimenCurves {
   Study study_;
   SpecimenResolution resolution_;
   double modulus_kPa_ = 1.0;
+  double solved_at_kPa_ = 1.0;  ///< the modulus in study_
   size_t modulus_index_ = 0;
   static inline std::mutex
       solving_;  ///< held while finite elements are solved: the solver below bears one at a time

@@ -57,6 +57,11 @@ std::vector<double> start_values(const Study& study, const Law& law) {
       refuse(study, fmt::format("law.parameters.{}.start", parameter.name),
              fmt::format("{} is not above {}", given->start, parameter.above), "Choose a larger start.");
     }
+    if (given->start > parameter.at_most) {
+      refuse(study, fmt::format("law.parameters.{}.start", parameter.name),
+             fmt::format("{} is above {}", given->start, parameter.at_most),
+             "Choose a smaller start, or widen the bounds in the law's file.");
+    }
     values.push_back(given->start);
   }
   return values;
@@ -166,7 +171,7 @@ void require_axes(const Study& study, const Law& law, const MeshBody& body) {
     if (!other->needs_axes()) isotropic.push_back(other->name());
   }
   const bool from_file = std::holds_alternative<MeshSpecimen>(study.specimen);
-  refuse(study, "law.name",
+  refuse(study, study.law.file ? "law.file" : "law.name",
          fmt::format("the law {} needs to know where the fibres run, and {}", law.name(),
                      from_file ? "the mesh file has no fibre_deg" : "this kind of specimen has no fibres"),
          fmt::format("{} (docs/mesh-file.md), or choose a law without fibres: {}.",
@@ -266,6 +271,12 @@ Placement placement_of(const Study& study) {
     placement.rotation.col(static_cast<Eigen::Index>(axis)) =
         Eigen::Vector3d(study.data.to_specimen->axes[axis].data());
   return placement;
+}
+
+bool is_modulus(const Study& study, const StudyParameter& parameter) {
+  const Law& law = law_of(study);
+  const size_t index = law.parameter_index(parameter.name);
+  return index < law.parameters().size() && law.parameters()[index].is_modulus();
 }
 
 SpecimenParts specimen_parts(const Study& study, SolveOptions options, std::vector<Finding>* findings) {

@@ -17,6 +17,9 @@ MeshBody study_body(const Study& study, std::vector<Finding>* findings = nullptr
 /// These findings alone.
 std::vector<Finding> fibre_findings(const Study& study);
 
+/// Whether the study's law has a modulus of that name (LawParameter::is_modulus). Throws InputError if the law is unknown.
+bool is_modulus(const Study& study, const StudyParameter& parameter);
+
 /// From the specimen's axes to the images': [images.to_specimen]; nothing moves without it.
 Placement placement_of(const Study& study);
 
@@ -28,7 +31,7 @@ struct SpecimenParts {
 };
 
 /// Parameters take their `start`. Throws InputError if the law is unknown, if the study lacks one of its
-/// parameters or has one that it does not know, if a start lies outside what the law allows, or if it names
+/// parameters or has one that it does not know, if a start lies outside the law's bounds, or if it names
 /// an effect (the model has none), if the law needs axes and the body has no fibres, if the mesh file names no face
 /// to hold, or if it names no outer wall for the chamber, or one with a free rim for a sealed one.
 /// `findings` as study_body's.

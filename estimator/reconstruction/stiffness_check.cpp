@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "estimator/model/affected_model.hpp"
+#include "estimator/model/study_model.hpp"
 
 namespace diastole {
 namespace {
@@ -26,7 +27,7 @@ constexpr std::array<PressureUnit, 6> pressure_units{{{"mmHg", 7.50062},
 
 const StudyParameter* stiffness_parameter(const Study& study) {
   for (const StudyParameter& parameter : study.law.parameters) {
-    if (parameter.name.ends_with("_kPa")) return &parameter;
+    if (is_modulus(study, parameter)) return &parameter;
   }
   return nullptr;
 }
@@ -73,7 +74,7 @@ std::optional<ApparentStiffness> apparent_stiffness(const Study& study, const Fi
   }
   ApparentStiffness apparent{field.load.pressure_kPa / needed_kPa, {1.0, 1.0}};
   for (const StudyParameter& parameter : study.law.parameters) {
-    if (!parameter.name.ends_with("_kPa") || !(parameter.start > 0)) continue;
+    if (!is_modulus(study, parameter) || !(parameter.start > 0)) continue;
     apparent.allowed[0] = std::min(apparent.allowed[0], parameter.lower / parameter.start);
     apparent.allowed[1] = std::max(apparent.allowed[1], parameter.upper / parameter.start);
   }

@@ -178,7 +178,7 @@ const std::vector<Rule>& rules() {
        {"protocol/contract", "estimator/explain/verdict", "estimator/effects", "estimator/fe",
         "estimator/fit", "estimator/inference", "estimator/io", "estimator/mesh", "estimator/model",
         "estimator/motion_residuals", "estimator/parallel"}},
-      {"estimator/explain", {"protocol/contract", "estimator/effects", "estimator/io"}},
+      {"estimator/explain", {"protocol/contract", "estimator/effects", "estimator/io", "estimator/model"}},
       {"estimator/shaping",
        {"protocol/contract", "protocol/runfile", "estimator/effects", "estimator/inference", "estimator/io",
         "estimator/model", "estimator/parallel", "estimator/rig"}},

@@ -437,6 +437,32 @@ TEST_F(SolveCommand, RefusesALawThatNeedsFibresInABodyWithoutAny) {
                      testing::HasSubstr("diastole mesh export")));
 }
 
+TEST_F(SolveCommand, RefusesALawFileThatNeedsFibresAndAStartBeyondItsBounds) {
+  const auto with_law = [&](const std::string& energy) {
+    const auto file = folder_.write("own.law.toml", R"toml(
+format = "diastole-law"
+version = 1
+id = "own"
+energy_kPa = ")toml" + energy + R"toml("
+[[parameter]]
+name = "C1_kPa"
+unit = "kPa"
+bounds = [0, 5]
+typical = 3
+)toml");
+    std::string study = gel_study;
+    study.replace(study.find("name = \"neo-hookean\""), 20, "file = \"" + file.string() + "\"");
+    write_study(study);
+  };
+  with_law("C1_kPa * (I1 - 3) + if(lambda_f > 1.3, C1_kPa * (lambda_f - 1.3)^2, 0)");
+  EXPECT_THAT(refusal({"--pressure-kPa", "1", "--set", "C1_kPa=4"}),
+              testing::AllOf(testing::HasSubstr("law.file"), testing::HasSubstr("where the fibres run")));
+  with_law("C1_kPa * (I1 - 3)");
+  EXPECT_THAT(
+      refusal({"--pressure-kPa", "1"}),
+      testing::AllOf(testing::HasSubstr("law.parameters.C1_kPa.start"), testing::HasSubstr("above 5")));
+}
+
 TEST_F(SolveCommand, RefusesUnknownLawsAndParametersWithTheNearestName) {
   std::string text = gel_study;
   text.replace(text.find("neo-hookean"), 11, "neo-hookian");

@@ -6,6 +6,8 @@
 
 #include <cmath>
 
+#include "tests/estimator/io/scratch_file.hpp"
+
 namespace diastole::explain {
 namespace {
 
@@ -31,6 +33,24 @@ TEST(RunsAndImages, TheImagesModulusIsAMeasurementForTheRuns) {
   EXPECT_DOUBLE_EQ(modulus.start, 8.5);
   EXPECT_NEAR(std::log(modulus.upper / modulus.lower) / std::sqrt(12.0), std::hypot(0.08 / 8.5, 0.007),
               1e-12);
+}
+
+TEST(RunsAndImages, AModulusOfALawFileIsOneByItsUnit) {
+  const test::ScratchFolder folder;
+  const auto upper = [&](const std::string& unit, const std::string& energy) {
+    Study study;
+    study.law = {"own.law.toml",
+                 {{"c", 6.0, 1.0, 15.0, Variation::whole}},
+                 folder.write(unit.empty() ? "number.law.toml" : "modulus.law.toml",
+                              "format = \"diastole-law\"\nversion = 1\nid = \"own\"\nenergy_kPa = \"" +
+                                  energy + "\"\n[[parameter]]\nname = \"c\"\nunit = \"" + unit +
+                                  "\"\nbounds = [0, 100]\ntypical = 8\n")};
+    Explanation field = of(Verdict::named);
+    field.law.front().name = "c";
+    return with_imaged_modulus(study, field).law.parameters.front().upper;
+  };
+  EXPECT_LT(upper("kPa", "c * (I1 - 3)"), 9.0);
+  EXPECT_EQ(upper("", "8 [kPa] * (I1 - 3) * exp(c * (I1 - 3))"), 15.0);
 }
 
 TEST(RunsAndImages, WhatImagesDoNotExplainSaysNothingOfTheModulus) {

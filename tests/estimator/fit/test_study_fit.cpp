@@ -227,6 +227,19 @@ TEST_F(CoarseStudy, WhatCannotBeFittedIsRefused) {
   other = study_;
   other.law.parameters[0] = {"C1_kPa", 6.0, -1.0, 15.0, Variation::whole};
   EXPECT_THAT(message_of([&] { (void)fit_study(other, measurement_, {}); }), HasSubstr("lower bound -1"));
+  const test::ScratchFolder folder;
+  other.law = {"own.law.toml", {{"c", 6.0, 1.0, 15.0, Variation::whole}}, folder.write("own.law.toml", R"toml(
+format = "diastole-law"
+version = 1
+id = "own"
+energy_kPa = "c * (I1 - 3)"
+[[parameter]]
+name = "c"
+unit = "kPa"
+bounds = [0, 10]
+typical = 8
+)toml")};
+  EXPECT_THAT(message_of([&] { (void)fit_study(other, measurement_, {}); }), HasSubstr("upper bound 15"));
   std::erase_if(measurement_.tags, [](const TagPoint& tag) { return tag.frame > 0; });
   EXPECT_THAT(message_of([&] { (void)fit(); }), HasSubstr("frame 0"));
 }

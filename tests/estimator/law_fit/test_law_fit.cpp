@@ -133,6 +133,32 @@ TEST(LawFit, ATermThatTheDataDoNotAskForRestsOnItsBound) {
   EXPECT_THAT(fit.remarks, testing::Contains(HasSubstr("C2_kPa rests on its bound")));
 }
 
+TEST(LawFit, AValueBeyondAFilesUpperBoundRestsOnIt) {
+  const test::ScratchFolder folder;
+  const auto soft = read_law_file(folder.write("soft.law.toml", R"toml(
+format = "diastole-law"
+version = 1
+id = "soft"
+energy_kPa = "c * (I1 - 3) + d * (I2 - 3)"
+[[parameter]]
+name = "c"
+unit = "kPa"
+bounds = [0, 5]
+typical = 2
+[[parameter]]
+name = "d"
+unit = "kPa"
+bounds = [0, 100]
+typical = 2
+)toml"));
+  MadeTests made;
+  const LawFit fit = fit_law(*soft, Tests{made.uniaxial()});
+  EXPECT_EQ(fit.parameters[0].bound, inference::BoundSide::upper);
+  EXPECT_NEAR(value(fit, 0), 5.0, 1e-9);
+  EXPECT_LE(fit.parameters[0].ci95[1], 5.0);
+  EXPECT_THAT(fit.remarks, testing::Contains(HasSubstr("these data ask for more")));
+}
+
 TEST(LawFit, SaysThatALawMissesTheCurve) {
   MadeTests made(0.002);
   const Tests tests{made.uniaxial()};

@@ -4,6 +4,7 @@
 #include <hdf5.h>
 
 #include "estimator/model/session.hpp"
+#include "estimator/rig_fit/simulated_session.hpp"
 #include "protocol/runfile/amended_file.hpp"
 #include "tests/changed_run.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
@@ -43,6 +44,36 @@ TEST(Session, KnowsHowFarASmoothedMotionIsFromTheSteps) {
   const double smoothed_mL = read_session(study).runs.at(0).smoothed_mL;
   EXPECT_GT(smoothed_mL, 0.05);
   EXPECT_LT(smoothed_mL, 0.3);
+}
+
+/// Neither its name nor bounds that hold no 1 kPa matter.
+TEST(SpecimenFamily, FindsTheModulusOfALawFileByItsUnit) {
+  const test::ScratchFolder folder;
+  Study study = gel_study();
+  study.law = {"gel.law.toml",
+               {{"b", 0.0, -0.5, 5.0, Variation::whole}, {"c1", 6.0, 3.0, 15.0, Variation::whole}},
+               folder.write("gel.law.toml", R"toml(
+format = "diastole-law"
+version = 1
+id = "my-gel"
+energy_kPa = "c1 * (I1 - 3) * exp(b * (I1 - 3))"
+[[parameter]]
+name = "b"
+bounds = [-1, 10]
+typical = 1
+[[parameter]]
+name = "c1"
+unit = "kPa"
+bounds = [2, 20]
+typical = 8
+)toml")};
+  const SpecimenFamily family(study, {{4, 2, 1}, {4, 2, 1}, 16.0, 3, 1, 1});
+  EXPECT_EQ(family.modulus().name, "c1");
+  EXPECT_EQ(family.modulus_start_kPa(), 6.0);
+  const SpecimenFamily built_in = gel_family();
+  for (const double volume_mL : {-16.0, 16.0, 48.0})
+    EXPECT_NEAR(family.plain().at(volume_mL).pressure_kPa / built_in.plain().at(volume_mL).pressure_kPa, 1.0,
+                1e-6);
 }
 
 }  // namespace
