@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "estimator/expressions/curve.hpp"
 #include "estimator/expressions/formula.hpp"
+#include "estimator/expressions/program.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/table_reader.hpp"
 
@@ -47,6 +49,19 @@ std::optional<Out> law_named(std::string_view name) {
   return static_cast<Out>(found - laws.begin());
 }
 
+/// Times and constants are known at every port.
+bool is_known_at(In in, std::string_view port) {
+  return in < In::V_command || in >= first_constant || std::ranges::any_of(laws, [&](const LawText& law) {
+           return law.port == port && std::ranges::count(law.inputs, in) > 0;
+         });
+}
+
+/// A formula that a rig's simulation asks.
+struct Asked {
+  PlacedText text;
+  NodeId node;
+};
+
 class Reader {
  public:
   explicit Reader(TableReader root) : root_(std::move(root)) {}
@@ -55,7 +70,8 @@ class Reader {
     root_.expect_format("diastole-effect", 1);
     effect_.file = root_.file();
     read_heading();
-    for (TableReader& table : root_.tables("parameter"))
+    std::vector<TableReader> parameters = root_.tables("parameter");
+    for (TableReader& table : parameters)
       read_parameter(table);
     if (effect_.parameters.empty())
       root_.fail(
@@ -74,6 +90,12 @@ class Reader {
     equations.finish();
     if (effect_.laws.empty() && effect_.constants.empty())
       equations.fail("", "sets nothing of the rig", fmt::format("Write one of {}.", settable()));
+    require_use(parameters);
+    try {
+      require_finite();
+    } catch (const std::length_error& error) {
+      root_.fail("equations", error.what(), "Shorten the equations.");
+    }
     read_text();
     root_.finish();
     return std::move(effect_);
@@ -81,13 +103,7 @@ class Reader {
 
  private:
   void read_heading() {
-    effect_.id = root_.text("id");
-    const bool is_id = !effect_.id.empty() && std::ranges::all_of(effect_.id, [](char c) {
-      return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-';
-    });
-    if (!is_id)
-      root_.fail("id", fmt::format("\"{}\" is no id", effect_.id),
-                 "Write small letters, digits and hyphens, as \"my-seal\".");
+    effect_.id = expressions::read_id(root_);
     effect_.title = root_.text("title");
     effect_.port = root_.choice("port", {"drive", "specimen", "sensor", "clock"});
     effect_.keeps_modulus = root_.flag_or("keeps_modulus", true);
@@ -97,9 +113,16 @@ class Reader {
     for (size_t i = 0; i < quantity_count; ++i) {
       const auto in = static_cast<In>(i);
       if (quantities[i].name.empty() || (in == In::t_since && effect_.change_points == "none")) continue;
+      if (!is_known_at(in, effect_.port)) continue;
       scope_.names[std::string(quantities[i].name)] = {effect_.graph.input(i),
                                                        known_unit(quantities[i].unit)};
     }
+  }
+
+  /// Of a quantity too that this port does not know.
+  [[nodiscard]] bool has_meaning(const std::string& name) const {
+    return scope_.names.contains(name) || scope_.curves.contains(name) ||
+           std::ranges::count(quantities, name, &QuantityText::name) > 0;
   }
 
   /// A name that the file brings along.
@@ -108,7 +131,7 @@ class Reader {
     if (!expressions::is_name(name))
       table.fail("name", fmt::format("\"{}\" cannot be a name in formulas", name),
                  "Write letters, digits and _, beginning with a letter, that are not a function's name.");
-    if (scope_.names.contains(name) || scope_.curves.contains(name) || law_named(name))
+    if (has_meaning(name) || law_named(name))
       table.fail("name", fmt::format("\"{}\" has a meaning already", name), "Choose another name.");
     return name;
   }
@@ -167,6 +190,11 @@ class Reader {
                  "Give the parameter that unit.");
     parameter.neutral_constant = *constant;
     parameter.neutral = quantity.usual;
+    if (parameter.neutral < parameter.lower || parameter.neutral > parameter.upper)
+      table.fail("neutral",
+                 fmt::format("{} is {:g} in the rig that effects are tried in, outside [{}, {}]", name,
+                             parameter.neutral, parameter.lower, parameter.upper),
+                 "Widen the bounds: with the neutral value nothing changes.");
   }
 
   void read_curve(TableReader& table) {
@@ -208,6 +236,8 @@ class Reader {
           if (effect_.graph.depends_on(state.initial, effect_.input_of_state(k)))
             fail(initial, fmt::format("depends on the state {}", effect_.states[k].name),
                  "A state begins at what parameters and the rig say.");
+        formulas_ += initial.text + ";";
+        asked_.push_back({initial, state.initial});
       }
     }
     table.finish();
@@ -217,12 +247,15 @@ class Reader {
       table.fail("name", "states belong to an effect that sets V_piston, p or p_seen",
                  "Set one of these, or write the effect without states.");
     require_inputs(effect_.laws.front().sets, state.rate, rate);
+    formulas_ += rate.text + ";";
+    asked_.push_back({rate, state.rate});
     effect_.equations += fmt::format("; d{}/dt = {}", state.name, rate.text);
   }
 
   void read_equation(TableReader& table, const std::string& name, const PlacedText& text) {
     if (!effect_.equations.empty()) effect_.equations += "; ";
     effect_.equations += fmt::format("{} = {}", name, text.text);
+    formulas_ += text.text + ";";
     if (const auto law = law_named(name)) {
       const LawText& about = laws[static_cast<size_t>(*law)];
       require_port(table, name, about.port);
@@ -235,6 +268,7 @@ class Reader {
       require_inputs(*law, node, text);
       require_form(*law, node, text);
       effect_.laws.push_back({*law, node});
+      asked_.push_back({text, node});
     } else if (const In* constant = constant_named(name)) {
       require_port(table, name, port_of(*constant));
       const NodeId node = expressions::parse_formula_in(
@@ -246,8 +280,9 @@ class Reader {
                "Make it of parameters and other constants.");
       }
       effect_.constants.push_back({*constant, node});
+      asked_.push_back({text, node});
     } else {
-      if (!expressions::is_name(name) || scope_.names.contains(name) || scope_.curves.contains(name))
+      if (!expressions::is_name(name) || has_meaning(name))
         table.fail(name, "has a meaning already and cannot be set",
                    fmt::format("Write one of {}.", settable()));
       scope_.names[name] = expressions::parse_formula(text, scope_, effect_.graph);
@@ -259,6 +294,14 @@ class Reader {
     const size_t k = i - quantity_count;
     return k < effect_.parameters.size() ? effect_.parameters[k].name
                                          : effect_.states[k - effect_.parameters.size()].name;
+  }
+  /// Behind a number; nothing for pure numbers and states.
+  [[nodiscard]] std::string unit_of_input(size_t i) const {
+    const size_t parameter = i - quantity_count;
+    const std::string unit = i < quantity_count                      ? std::string(quantities[i].unit)
+                             : parameter < effect_.parameters.size() ? effect_.parameters[parameter].unit
+                                                                     : "";
+    return unit.empty() || unit == "1" ? "" : " " + unit;
   }
   static std::string settable() {
     std::string list;
@@ -305,6 +348,45 @@ class Reader {
         fail(text, "is not a constant and a multiple of t", "Write for example t - delay or t * (1 + skew).");
   }
 
+  void require_use(const std::vector<TableReader>& parameters) const {
+    for (size_t i = 0; i < parameters.size(); ++i)
+      if (!expressions::mentions(formulas_, effect_.parameters[i].name))
+        parameters[i].fail("name", fmt::format("no formula uses {}", effect_.parameters[i].name),
+                           "Remove the parameter, or use it in an equation.");
+  }
+
+  [[nodiscard]] double value(NodeId node, const std::vector<double>& inputs) const {
+    return expressions::Program(effect_.graph, std::vector{node})(inputs.data());
+  }
+
+  /// At rest and in the middle of a stroke, with neutral and with typical values.
+  void require_finite() const {
+    for (const bool in_motion : {false, true}) {
+      std::vector<double> inputs(effect_.inputs(), 0.0);
+      for (size_t i = 0; i < quantity_count; ++i)
+        if (in_motion || static_cast<In>(i) >= first_constant || static_cast<In>(i) == In::p_atm)
+          inputs[i] = quantities[i].usual;
+      for (const auto of_parameter : {&FileParameter::neutral, &FileParameter::typical}) {
+        for (size_t i = 0; i < effect_.parameters.size(); ++i)
+          inputs[effect_.input_of_parameter(i)] = effect_.parameters[i].*of_parameter;
+        for (size_t i = 0; i < effect_.states.size(); ++i)
+          inputs[effect_.input_of_state(i)] = value(effect_.states[i].initial, inputs);
+        for (const Asked& formula : asked_)
+          if (!std::isfinite(value(formula.node, inputs))) fail_with(formula, inputs);
+      }
+    }
+  }
+  [[noreturn]] void fail_with(const Asked& formula, const std::vector<double>& inputs) const {
+    std::string with;
+    for (size_t i = 0; i < inputs.size(); ++i)
+      if (effect_.graph.depends_on(formula.node, i))
+        with += fmt::format("{} {} = {:g}{}", with.empty() ? " with" : ",", name_of_input(i), inputs[i],
+                            unit_of_input(i));
+    fail(formula.text, "is not a finite number" + with,
+         "A formula must be finite at rest and in motion: leave out where it is not, as in "
+         "if(t > 0 [s], ..., 0) or max(p, 0.01 [kPa]), or correct its numbers.");
+  }
+
   void read_text() {
     std::optional<TableReader> text = root_.table_if("text");
     if (!text) return;
@@ -320,6 +402,8 @@ class Reader {
   EffectFile effect_;
   Scope scope_;
   std::vector<Unit> state_units_;
+  std::vector<Asked> asked_;
+  std::string formulas_;  ///< all of them
 };
 
 }  // namespace

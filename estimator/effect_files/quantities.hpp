@@ -57,29 +57,29 @@ struct QuantityText {
   std::string_view name;
   std::string_view unit;
   std::string_view meaning;
-  double usual = 0.0;  ///< a constant's in the paper's rig
+  double usual = 0.0;  ///< a constant's in the paper's rig; another's in the middle of a stroke
 };
 
 /// In the order of `In`. cycle_rate has no name: nobody asks for it.
 inline constexpr std::array<QuantityText, quantity_count> quantities{
-    {{"t", "s", "time since the run's start"},
-     {"t_session", "s", "time since the session's first run began"},
-     {"t_since", "s", "time since the moment at which it happens; only with change_points"},
-     {"phase", "1", "part of the cycle that has passed, 0 to 1"},
-     {"cycle", "1", "cycles done in the session, the running one in part"},
-     {"", "1/s", ""},
-     {"p_atm", "kPa", "atmospheric pressure"},
-     {"V_command", "mL", "volume that the steps command"},
-     {"q_command", "mL/s", "its rate"},
-     {"a_command", "mL/s^2", "its acceleration"},
-     {"q_piston", "mL/s", "flow that the piston displaces"},
-     {"p_pump", "kPa", "pressure in the cylinder"},
-     {"p", "kPa", "pressure before this effect"},
-     {"V", "mL", "volume that the specimen has taken"},
-     {"dV", "mL/s", "its rate"},
-     {"V_max", "mL", "the largest so far in the session"},
-     {"q_hose", "mL/s", "flow through the hose"},
-     {"p_cavity", "kPa", "pressure in the cavity"},
+    {{"t", "s", "time since the run's start", 1.0},
+     {"t_session", "s", "time since the session's first run began", 1.0},
+     {"t_since", "s", "time since the moment at which it happens; only with change_points", 0.5},
+     {"phase", "1", "part of the cycle that has passed, 0 to 1", 0.25},
+     {"cycle", "1", "cycles done in the session, the running one in part", 0.25},
+     {"", "1/s", "", 1.0},
+     {"p_atm", "kPa", "atmospheric pressure", 101.325},
+     {"V_command", "mL", "volume that the steps command", 20.0},
+     {"q_command", "mL/s", "its rate", 50.0},
+     {"a_command", "mL/s^2", "its acceleration", 100.0},
+     {"q_piston", "mL/s", "flow that the piston displaces", 50.0},
+     {"p_pump", "kPa", "pressure in the cylinder", 10.0},
+     {"p", "kPa", "pressure before this effect", 5.0},
+     {"V", "mL", "volume that the specimen has taken", 20.0},
+     {"dV", "mL/s", "its rate", 50.0},
+     {"V_max", "mL", "the largest so far in the session", 20.0},
+     {"q_hose", "mL/s", "flow through the hose", 50.0},
+     {"p_cavity", "kPa", "pressure in the cavity", 5.0},
      {"c_hose", "m/s", "speed of pressure waves in the hose", 400.0},
      {"L_hose", "m", "length of the hose", 5.0},
      {"D_hose", "mm", "bore of the hose", 12.0},

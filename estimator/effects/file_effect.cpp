@@ -437,6 +437,8 @@ std::shared_ptr<const Effect> read_effect(const std::filesystem::path& file) {
     throw InputError({file.string(), "table [equations]", error.what(),
                       "A division by zero, or a logarithm of what is zero at rest? Every equation and its "
                       "slopes must be finite there."});
+  } catch (const std::length_error& error) {
+    throw InputError({file.string(), "table [equations]", error.what(), "Shorten the equations."});
   }
 }
 

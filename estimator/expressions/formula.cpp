@@ -58,6 +58,8 @@ const Function* function_named(std::string_view name) {
   return found == functions.end() ? nullptr : found;
 }
 
+bool is_of_name(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; }
+
 /// By the precedence of operators (V. R. Pratt, "Top down operator precedence", 1973).
 class Parser {
  public:
@@ -293,8 +295,7 @@ class Parser {
 
   Part name() {
     const size_t at = at_;
-    while (at_ < rest_.size() &&
-           (std::isalnum(static_cast<unsigned char>(rest_[at_])) != 0 || rest_[at_] == '_'))
+    while (at_ < rest_.size() && is_of_name(rest_[at_]))
       ++at_;
     const std::string name(rest_.substr(at, at_ - at));
     if (next() == '(') return call(name, at);
@@ -398,8 +399,18 @@ NodeId parse_formula_in(const PlacedText& text, const Scope& scope, Graph& graph
 bool is_name(std::string_view text) {
   if (text.empty() || text == "pi" || function_named(text) != nullptr) return false;
   if (std::isalpha(static_cast<unsigned char>(text.front())) == 0) return false;
-  return std::ranges::all_of(
-      text, [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; });
+  return std::ranges::all_of(text, is_of_name);
+}
+
+bool mentions(std::string_view formula, std::string_view name) {
+  for (size_t from = 0; from < formula.size();) {
+    size_t end = from;
+    while (end < formula.size() && is_of_name(formula[end]))
+      ++end;
+    if (formula.substr(from, end - from) == name) return true;
+    from = std::max(end, from + 1);
+  }
+  return false;
 }
 
 std::string read_id(TableReader& root) {

@@ -51,6 +51,9 @@ NodeId parse_formula_in(const PlacedText& text, const Scope& scope, Graph& graph
 /// Whether a name may be used: a letter, then letters, digits and _; not that of a function.
 bool is_name(std::string_view text);
 
+/// Whether the name stands in a formula, whatever becomes of it there.
+bool mentions(std::string_view formula, std::string_view name);
+
 /// The id of a file with formulas: small letters, digits and hyphens.
 std::string read_id(TableReader& root);
 

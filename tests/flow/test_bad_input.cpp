@@ -182,11 +182,11 @@ std::vector<BadInput> table() {
       {"AnEffectWithoutALimitAtRest",
        [](Place place) { return own_effect(place, "log(p_pump / 10 [kPa])"); },
        2,
-       {"own.effect.toml", "[equations]", "not a finite number", "at rest"}},
+       {"own.effect.toml", "key equations.q_hose", "not a finite number", "p_pump = 0 kPa", "at rest"}},
       {"AnEffectWithADivisionByZero",
        [](Place place) { return own_effect(place, "abs(p_pump) / 0 [kPa]"); },
        2,
-       {"own.effect.toml", "[equations]", "not a finite number"}},
+       {"own.effect.toml", "key equations.q_hose", "divides by zero"}},
       {"ADriveInMilliseconds",
        [](Place place) {
          return shape(place.write("ms.csv", "time_s,volume_mL\n0,0\n600,8\n900,3\n1200,0\n"), {});

@@ -122,6 +122,12 @@ TEST_F(Formulas, BeginNamesWithALetter) {
     EXPECT_FALSE(is_name(text)) << text;
 }
 
+TEST_F(Formulas, MentionWholeNames) {
+  EXPECT_TRUE(mentions("2 * a + sin(b_1)", "b_1"));
+  for (const char* name : {"b", "_1", "si", "2a", "c"})
+    EXPECT_FALSE(mentions("2 * a + sin(b_1)", name)) << name;
+}
+
 TEST_F(Formulas, HaveTheDerivativesOfDualNumbers) {
   using Dual = ceres::Jet<double, 6>;
   using Second = ceres::Jet<Dual, 6>;
