@@ -39,12 +39,19 @@ std::string joined(const std::vector<std::string_view>& ids) {
   return fmt::format("{}", fmt::join(ids, ", "));
 }
 
+std::string_view words_of(SearchScale scale) {
+  if (scale == SearchScale::linear) return "";
+  return scale == SearchScale::logarithmic ? ", searched by its logarithm"
+                                           : ", searched by its inverse square";
+}
+
 void print_for_people(std::string_view title, std::span<const EffectParameter> parameters) {
   if (parameters.empty()) return;
   fmt::print("\n  {}\n", title);
   for (const EffectParameter& parameter : parameters) {
-    fmt::print("    {:<28} {}; neutral {:g}, from {:g} to {:g}\n", parameter.name, parameter.meaning,
-               parameter.neutral, parameter.lower, parameter.upper);
+    fmt::print("    {:<28} {}{}neutral {:g}, from {:g} to {:g}{}{}{}\n", parameter.name, parameter.meaning,
+               parameter.meaning.empty() ? "" : "; ", parameter.neutral, parameter.lower, parameter.upper,
+               parameter.unit.empty() ? "" : " ", parameter.unit, words_of(parameter.scale));
   }
 }
 
@@ -61,20 +68,37 @@ void print_for_people(const Effect& effect) {
 
 struct StoppedTrial {};
 
-const Effect& known(const std::string& id) {
-  if (const Effect* effect = find_effect(id)) return *effect;
+std::vector<std::string> built_in_ids() {
   std::vector<std::string> ids;
   for (const Effect* effect : all_effects())
     ids.emplace_back(effect->text().id);
+  return ids;
+}
+
+const Effect& known(const std::string& id) {
+  if (const Effect* effect = find_effect(id)) return *effect;
+  const std::vector<std::string> ids = built_in_ids();
   throw InputError({"", "ID", fmt::format("there is no effect \"{}\"", id),
                     did_you_mean(id, ids) + "`diastole effects` lists them."});
 }
 
 bool is_file(const std::string& id) { return id.ends_with(".toml") || id.find('/') != std::string::npos; }
 
+/// Ids may be those of other files.
+void remark_on_ids(const std::string& file, const EffectDeclaration& text) {
+  for (const auto& [ids, key] : {std::pair{&text.conflicts, "looks_alike"}, {&text.synergies, "shows_with"}})
+    for (const std::string_view id : *ids)
+      if (find_effect(id) == nullptr)
+        fmt::print(stderr,
+                   "{}: key text.{}: no built-in effect is called \"{}\". {}Correct it, unless it is another "
+                   "file's.\n",
+                   file, key, id, did_you_mean(id, built_in_ids()));
+}
+
 /// A file's effect with the checks that every effect must pass.
 ExitCode check_file(const std::string& file, size_t threads, const CommandOutput& out) {
   const std::shared_ptr<const Effect> effect = read_effect(file);
+  remark_on_ids(file, effect->text());
   if (!out.json) print_for_people(*effect);
   const Interruption interruption;
   std::vector<explain::EffectCheck> checks;

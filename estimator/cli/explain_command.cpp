@@ -52,8 +52,8 @@ void print_progress(const std::string& text) {
 }
 
 std::string with_units(const explain::FoundParameter& parameter) {
-  return fmt::format("    {:<28} {:.6g}   (90 %: {:.6g} to {:.6g})\n", parameter.name, parameter.value,
-                     parameter.ci90[0], parameter.ci90[1]);
+  return fmt::format("    {:<28} {:.6g}{}{}   (90 %: {:.6g} to {:.6g})\n", parameter.name, parameter.value,
+                     parameter.unit.empty() ? "" : " ", parameter.unit, parameter.ci90[0], parameter.ci90[1]);
 }
 
 std::string place_of(const explain::Misfit& misfit) {

@@ -287,7 +287,8 @@ void add_effects(Page& page, const Explanation& e) {
   std::vector<std::vector<std::string>> rows;
   for (const FoundEffect& effect : e.effects) {
     for (const FoundParameter& parameter : effect.parameters) {
-      rows.push_back({effect.id, with_error(parameter.value, parameter.standard_error),
+      const std::string value = with_error(parameter.value, parameter.standard_error);
+      rows.push_back({effect.id, parameter.unit.empty() ? value : value + " " + parameter.unit,
                       fmt::format("{} to {}", number(parameter.ci90[0]), number(parameter.ci90[1])),
                       effect.size_over_model_error ? number(*effect.size_over_model_error, 2) : "–",
                       parameter.name});

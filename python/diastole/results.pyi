@@ -632,6 +632,7 @@ class FoundEffect(Record):
 @dataclass(frozen=True)
 class FoundParameter(Record):
     value: float | None
+    unit: str
     ci90: list[float | None]
     standard_error: float | None
 

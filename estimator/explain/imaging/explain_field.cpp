@@ -333,6 +333,7 @@ class Explainer {
     const EffectParameter& parameter = choice.parameter(value);
     FoundParameter out;
     out.name = parameter.name;
+    out.unit = parameter.unit;
     out.value = choice.values[value];
     out.ci90 = {out.value, out.value};
     const auto place = std::ranges::find(choice.free, value);

@@ -94,7 +94,7 @@ std::vector<FoundEffect> found_effects(const rig::SessionProblem& problem, const
       const double sd = errors[static_cast<Index>(at)];
       found.parameters.push_back({std::string(parameter.name), set.model.values[at],
                                   inference::standard_error(unknown, coordinate, sd),
-                                  interval_of(unknown, coordinate, sd)});
+                                  interval_of(unknown, coordinate, sd), std::string(parameter.unit)});
       ++at;
     }
     for (const ChangePoint& change_point : term.change_points)

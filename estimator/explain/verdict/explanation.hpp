@@ -24,6 +24,7 @@ struct FoundParameter {
   double value = 0.0;
   double standard_error = 0.0;
   std::array<double, 2> ci90{};  ///< of the profile or, where it is symmetric, 1.645 standard errors
+  std::string unit = {};         ///< for people: "m/s"; empty of a pure number
 };
 
 /// When an effect began: the run and the second at which steps were lost or a sensor stepped.

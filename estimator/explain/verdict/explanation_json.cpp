@@ -10,7 +10,7 @@
 namespace diastole {
 namespace explain {
 
-DIASTOLE_MEMBERS(FoundParameter, value, ci90, standard_error)
+DIASTOLE_MEMBERS(FoundParameter, value, unit, ci90, standard_error)
 
 DIASTOLE_MEMBERS(FoundChangePoint, run, time_s)
 

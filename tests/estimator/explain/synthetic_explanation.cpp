@@ -51,7 +51,7 @@ Explanation explained_hose() {
       "The hose swells more than its description says: pressure waves travel in it at 61 m/s, not 400. With "
       "that the "
       "model predicts the sweep, which was not fitted, to within 1.1 times the noise.";
-  e.effects = {{"hose-compliance", {{"wave_speed_m_s", 61.2, 2.1, {58.0, 65.0}}}, {}}};
+  e.effects = {{"hose-compliance", {{"wave_speed_m_s", 61.2, 2.1, {58.0, 65.0}, "m/s"}}, {}}};
   e.where = {{"drive", "sweep.run.h5", "pump_kPa", 2, {{0.4, 0.6}}, {{2.0, 6.0}}, "", 31.5, 1e-9},
              {"drive", "baseline.run.h5", "cavity_kPa", 0, {}, {}, "", 12.0, 2e-4}};
   e.gap = {14.2, 1.1, 1.0, 0.992, {"sweep.run.h5"}};

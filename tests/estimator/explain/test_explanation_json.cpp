@@ -29,6 +29,7 @@ TEST(ExplanationJson, HasTheKeysOfTheContract) {
   EXPECT_EQ(json.at("verdict"), "named");
   const auto& speed = json.at("effects").at(0).at("parameters").at("wave_speed_m_s");
   EXPECT_EQ(speed.at("value"), 61.2);
+  EXPECT_EQ(speed.at("unit"), "m/s");
   EXPECT_EQ(speed.at("ci90"), nlohmann::json::parse("[58.0, 65.0]"));
   EXPECT_EQ(json.at("effects").at(0).at("id"), "hose-compliance");
   EXPECT_TRUE(json.at("ambiguous_with").is_array());

@@ -159,7 +159,7 @@ TEST(ExplanationReport, ReportsEveryPartOfAnExplanation) {
   for (const char* text : {"Where model and measurement disagree: gel", "hose-compliance", "14.2 → 1.1",
                            "soft hose", "The gap, effect by effect", "Pressure against the volume",
                            "no model can go below it", "residual / noise", "8.780 ± 0.040", "−9.7 %",
-                           "The evidence", "refuted: predicts the sweep worse by 1110",
+                           "61.2 ± 2.1 m/s", "The evidence", "refuted: predicts the sweep worse by 1110",
                            "What to measure next", "waveform = &quot;sinusoidal&quot;",
                            "explained.study.toml", "held out", "segment 2, 0.40 to 0.60 of the cycle"})
     EXPECT_THAT(page, HasSubstr(text));
