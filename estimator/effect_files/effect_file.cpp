@@ -355,24 +355,42 @@ class Reader {
                            "Remove the parameter, or use it in an equation.");
   }
 
-  [[nodiscard]] double value(NodeId node, const std::vector<double>& inputs) const {
-    return expressions::Program(effect_.graph, std::vector{node})(inputs.data());
+  /// All neutral, all typical, and each at either bound beside typical ones.
+  [[nodiscard]] std::vector<std::vector<double>> tried_values() const {
+    std::vector<std::vector<double>> tried(2);
+    for (const FileParameter& parameter : effect_.parameters) {
+      tried[0].push_back(parameter.neutral);
+      tried[1].push_back(parameter.typical);
+    }
+    for (size_t i = 0; i < effect_.parameters.size(); ++i)
+      for (const double bound : {effect_.parameters[i].lower, effect_.parameters[i].upper}) {
+        std::vector<double> values = tried[1];
+        values[i] = bound;
+        tried.push_back(std::move(values));
+      }
+    return tried;
   }
 
-  /// At rest and in the middle of a stroke, with neutral and with typical values.
+  [[nodiscard]] expressions::Program program(NodeId node) const { return {effect_.graph, std::vector{node}}; }
+
+  /// At rest and in the middle of a stroke.
   void require_finite() const {
+    std::vector<expressions::Program> formulas, initial;
+    for (const Asked& formula : asked_)
+      formulas.push_back(program(formula.node));
+    for (const FileState& state : effect_.states)
+      initial.push_back(program(state.initial));
     for (const bool in_motion : {false, true}) {
       std::vector<double> inputs(effect_.inputs(), 0.0);
       for (size_t i = 0; i < quantity_count; ++i)
         if (in_motion || static_cast<In>(i) >= first_constant || static_cast<In>(i) == In::p_atm)
           inputs[i] = quantities[i].usual;
-      for (const auto of_parameter : {&FileParameter::neutral, &FileParameter::typical}) {
-        for (size_t i = 0; i < effect_.parameters.size(); ++i)
-          inputs[effect_.input_of_parameter(i)] = effect_.parameters[i].*of_parameter;
-        for (size_t i = 0; i < effect_.states.size(); ++i)
-          inputs[effect_.input_of_state(i)] = value(effect_.states[i].initial, inputs);
-        for (const Asked& formula : asked_)
-          if (!std::isfinite(value(formula.node, inputs))) fail_with(formula, inputs);
+      for (const std::vector<double>& values : tried_values()) {
+        std::ranges::copy(values, &inputs[effect_.input_of_parameter(0)]);
+        for (size_t i = 0; i < initial.size(); ++i)
+          inputs[effect_.input_of_state(i)] = initial[i](inputs.data());
+        for (size_t i = 0; i < formulas.size(); ++i)
+          if (!std::isfinite(formulas[i](inputs.data()))) fail_with(asked_[i], inputs);
       }
     }
   }
@@ -384,7 +402,7 @@ class Reader {
                             unit_of_input(i));
     fail(formula.text, "is not a finite number" + with,
          "A formula must be finite at rest and in motion: leave out where it is not, as in "
-         "if(t > 0 [s], ..., 0) or max(p, 0.01 [kPa]), or correct its numbers.");
+         "if(t > 0 [s], ..., 0) or max(p, 0.01 [kPa]), or correct its numbers or its parameters' bounds.");
   }
 
   void read_text() {

@@ -202,7 +202,8 @@ TEST(FileEffects, RefuseWhatNoRigCanDo) {
 TEST(FileEffects, RefuseAFormulaThatIsNotFiniteAtRestOrInMotion) {
   for (const auto& [term, with] :
        {std::pair{"1 [s] / t", "t = 0 s"}, std::pair{"log(p / 1 [kPa])", "p = 0 kPa"},
-        std::pair{"(p / 1 [kPa])^1e308", "p = 5 kPa"}}) {
+        std::pair{"(p / 1 [kPa])^1e308", "p = 5 kPa"},
+        std::pair{"(1 / (1 - G * 1 [s kPa/mL]))", "G = 1 mL/(s kPa)"}}) {
     const InputFault fault =
         fault_of("sensor", "[equations]\np_seen = \"p + G * 1 [s kPa^2/mL] * " + std::string(term) + "\"\n");
     EXPECT_EQ(fault.place, "line 12, column 11, key equations.p_seen") << term;
