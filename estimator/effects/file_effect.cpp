@@ -70,13 +70,16 @@ struct Laws {
   Program constants;
   Program
       law;  ///< its value; of V_piston without memory its rate and acceleration too; of a leak what is lost
-  Program at_rest;         ///< of a leak past the seal: what is lost, and the conductance
-  bool is_linear = false;  ///< of that: nothing but a conductance
+  NodeId lost = 0;         ///< of a leak past the seal
+  Program conductance;     ///< of one that is nothing but that
+  bool is_linear = false;  ///< it is one
   bool has_rates = false;  ///< V_piston's value, rate and acceleration
   bool uses_cycle = false;
   StatePrograms states;
 
   explicit Laws(EffectFile read);
+  /// Whether the formula of what is lost past the seal holds anything with these values for the file's parameters.
+  [[nodiscard]] bool leaks(std::span<const double> inputs) const;
 
  private:
   NodeId rate_of(NodeId node);
@@ -123,13 +126,13 @@ Laws::Laws(EffectFile read) : file(std::move(read)) {
     } else if (sets == Out::q_hose || sets == Out::q_cavity) {
       const In flow = sets == Out::q_hose ? In::q_piston : In::q_hose;
       const size_t pressure = index_of(sets == Out::q_hose ? In::p_pump : In::p_cavity);
-      const NodeId lost = graph.make(Operation::negate, graph.substituted(node, index_of(flow), none));
-      const NodeId conductance = graph.derivative(lost, pressure);
+      lost = graph.make(Operation::negate, graph.substituted(node, index_of(flow), none));
+      const NodeId slope = graph.derivative(lost, pressure);
       outputs = {lost};
       is_linear = graph.is_number(graph.substituted(lost, pressure, none), 0.0);
       for (size_t i = 0; i < index_of(effect_files::first_constant); ++i)
-        is_linear = is_linear && !graph.depends_on(conductance, i);
-      at_rest = Program(graph, std::vector{lost, conductance});
+        is_linear = is_linear && !graph.depends_on(slope, i);
+      if (is_linear) conductance = Program(graph, std::vector{slope});
     } else if (sets == Out::t_seen) {
       outputs = {graph.substituted(node, index_of(In::t), none), graph.derivative(node, index_of(In::t))};
     }
@@ -137,6 +140,18 @@ Laws::Laws(EffectFile read) : file(std::move(read)) {
   }
   uses_cycle = any_depends(graph, all, In::phase) || any_depends(graph, all, In::cycle);
   states = StatePrograms(graph, initial, rates, file.input_of_state(0));
+}
+
+bool Laws::leaks(std::span<const double> inputs) const {
+  Graph graph = file.graph;
+  NodeId left = lost;
+  try {
+    for (size_t i = file.input_of_parameter(0); i < file.input_of_state(0); ++i)
+      left = graph.substituted(left, i, graph.number(inputs[i]));
+  } catch (const std::logic_error&) {  // no finite number, or too long: whoever simulates it sees that
+    return true;
+  }
+  return !graph.is_number(left, 0.0);
 }
 
 /// The laws with values for their parameters: what hooks of a model hold.
@@ -228,52 +243,24 @@ class FileMemory final : public rig::SpecimenMemory {
 };
 
 /// What is lost at a pressure, as one leak of a run.
-rig::LeakMaker leak_of(const Bound& bound, In pressure, double without_mL_s_kPa) {
+rig::LeakMaker leak_of(const Bound& bound, In pressure) {
   return [=](const rig::RunPlace& place) -> rig::LeakLaw {
     if (!bound.concerns(place)) return [](double, double) { return 0.0; };
-    return
-        [here = Bound(bound), place, pressure, without_mL_s_kPa](double pressure_kPa, double time_s) mutable {
-          here.set_time(time_s, place);
-          here[pressure] = pressure_kPa;
-          return here.laws->law(here.inputs.data()) - without_mL_s_kPa * pressure_kPa;
-        };
+    return [here = Bound(bound), place, pressure](double pressure_kPa, double time_s) mutable {
+      here.set_time(time_s, place);
+      here[pressure] = pressure_kPa;
+      return here.laws->law(here.inputs.data());
+    };
   };
 }
 
-/// The law's conductance (mL/s/kPa) at the lowest pressure at which it is no small part of its largest: a relief valve is nothing
-/// until it opens, what happens later is nothing at first. Pressures are those that a cylinder may see.
-double usual_conductance(Bound bound, double least_part) {
-  std::vector<double> conductances;
-  for (const double pressure_kPa : {10.0, 20.0, 40.0, 80.0, 160.0}) {
-    double& largest = conductances.emplace_back(0.0);
-    for (const double time_s : {0.0, 1.0, 10.0, 100.0}) {
-      for (const In time : {In::t, In::t_session, In::t_since, In::cycle})
-        bound[time] = time_s;
-      for (const double signed_kPa : {pressure_kPa, -std::min(pressure_kPa, 80.0)}) {  // 101 are a vacuum
-        bound[In::p_pump] = signed_kPa;
-        const double conductance = std::abs(bound.laws->law(bound.inputs.data()) / signed_kPa);
-        if (std::isfinite(conductance)) largest = std::max(largest, conductance);
-      }
-    }
+void add_pump_leak(const Bound& bound, rig::RigModel& model) {
+  const double conductance = bound.laws->is_linear ? bound.laws->conductance(bound.inputs.data()) : -1.0;
+  if (conductance >= 0.0) {
+    model.pump_leak_mL_s_kPa += conductance;
+  } else if (bound.laws->leaks(bound.inputs)) {
+    model.pump_leaks.push_back(leak_of(bound, In::p_pump));
   }
-  const double least = least_part * std::ranges::max(conductances);
-  return *std::ranges::find_if(conductances, [&](double at) { return at >= least; });
-}
-
-void add_pump_leak(Bound bound, rig::RigModel& model) {
-  constexpr double least_part = 0.01;
-  std::array<double, 2> rest{};  // what is lost, the conductance
-  bound[In::p_pump] = 0.0;
-  bound.laws->at_rest.run(bound.inputs.data(), rest.data());
-  if (bound.laws->is_linear && rest[1] >= 0.0) {
-    model.pump_leak_mL_s_kPa += rest[1];
-    return;
-  }
-  const double usual = usual_conductance(bound, least_part);
-  if (rest[1] == 0.0 && usual == 0.0) return;
-  const bool opens = rest[1] < least_part * usual;
-  model.pump_leak_mL_s_kPa += opens ? least_part * usual : rest[1];
-  model.pump_leaks.push_back(leak_of(bound, In::p_pump, opens ? 0.0 : rest[1]));
 }
 
 /// What is lost into the hose, as one law of a run.
@@ -312,7 +299,7 @@ void add_law(const Bound& bound, rig::RigModel& model) {
           });
       break;
     case Out::q_cavity:
-      model.cavity_leaks.push_back(leak_of(bound, In::p_cavity, 0.0));
+      model.cavity_leaks.push_back(leak_of(bound, In::p_cavity));
       break;
     case Out::p_seen:
       if (bound.laws->file.states.empty()) {

@@ -4,9 +4,8 @@
 //
 //   V_piston   the drive's trace; flow and acceleration are its exact derivatives in time, or differences if it has states
 //              or depends on the flow
-//   q_hose     a leak past the seal: its conductance at rest belongs to the hose's linear end, the rest is a load there. A
-//              leak that has none at rest gets a hundredth of what it has at 10 kPa: the pressure before a valve that
-//              shuts is not known
+//   q_hose     a leak past the seal: a conductance of the hose's linear end where it is nothing else, else a law of the pump's
+//              end (pump_end.hpp)
 //   p_pump     a loss of pressure at the pump's end of the hose
 //   p          the specimen's memory
 //   q_cavity   a leak at the cavity

@@ -136,6 +136,8 @@ void HoseLine::make_step(double step_s) {
   flow_ = SmallMatrix(exponential.topLeftCorner(size, size));
   from_end_ = SmallMatrix(from_end);
   from_start_ = SmallMatrix(exponential.block(0, size, size, count_) - from_end);
+  by_pump_load_.setZero(SmallMatrix::padded(size));
+  if (yields_) by_pump_load_.head(size) = from_end.col(0);
 }
 
 void HoseLine::make_drag(double length_m) {

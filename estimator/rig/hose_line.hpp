@@ -50,6 +50,11 @@ struct EndLoads {
   double cavity_kPa = 0.0;           ///< p_L
 };
 
+/// By how much y and y' at a step's end are larger for a kPa more of the pump's load there.
+struct YieldByLoad {
+  double mL_per_kPa = 0.0, mL_per_s_kPa = 0.0;
+};
+
 class HoseLine {
  public:
   HoseLine(const Hose& hose, const LineOptions& options);
@@ -68,6 +73,9 @@ class HoseLine {
   void begin_step(const EndLoads& now, double piston_flow_at_end);
   /// The state at the step's end, with the loads that belong to the predicted one.
   void end_step(const EndLoads& then);
+  /// The state at the step's end, predicted or not, with so much more of the pump's load there; only if y is a degree of freedom.
+  void add_pump_load(double more_kPa) { state_ += more_kPa * by_pump_load_; }
+  [[nodiscard]] YieldByLoad yield_by_load() const { return {by_pump_load_[0], by_pump_load_[count_]}; }
   /// p_0 when last settled, kPa.
   [[nodiscard]] double pump_kPa() const { return pump_kPa_; }
 
@@ -118,7 +126,7 @@ class HoseLine {
   // At the points along the line: speeds and stretchings by velocities; dv/dt by state, forces, drag.
   SmallMatrix speeds_, rate_by_state_, rate_by_force_, rate_by_drag_, force_by_drag_;
   Eigen::VectorXd point_part_, point_weight_;  ///< of the length, and in m
-  Eigen::VectorXd pump_by_state_, pump_by_force_;
+  Eigen::VectorXd pump_by_state_, pump_by_force_, by_pump_load_;
 
   Eigen::VectorXd state_, drifted_, bare_, force_, speed_, bare_rate_, rate_, gradient_;
   std::vector<WallFriction::Drag> drag_;

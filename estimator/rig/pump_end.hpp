@@ -7,12 +7,15 @@
 //   e_d' is taken as the drive's share C / (C + C_g) of the rate, C_g = V0 / (n p_a): exact for gas that is squeezed little. The
 //   smallest pockets are damped as the drive is.
 //
-// The hose's line holds the linear part of it (p = -K y - R y'); what differs is a load. Leaks are met by the trapezoid rule.
+// The hose's line holds the linear part of it (p = -K y - R y'); what differs is a load. Leaks are met by the trapezoid rule. Where
+// they are not in proportion to the pressure, the load at a step's end is that of the state to which it brings the line: it may
+// stand for nearly all of what the linear part makes, and be a hundred times as steep as what is left.
 
 #include <optional>
 #include <vector>
 
 #include "estimator/rig/gas_pocket.hpp"
+#include "estimator/rig/hose_line.hpp"
 #include "estimator/rig/rig_model.hpp"
 
 namespace diastole::rig {
@@ -28,14 +31,21 @@ class PumpEnd {
   [[nodiscard]] std::optional<double> resistance() const;
   /// The pressure, less what the linear end makes, when y mL have entered beyond what the piston displaced, at this rate.
   [[nodiscard]] double load_kPa(double yielded_mL, double yielding_mL_per_s, double time_s) const;
+  /// Whether something leaks that is not in proportion to the pressure.
+  [[nodiscard]] bool leaks() const { return !leaks_.empty(); }
+  /// Only then: what a load at the end of a step, by which y has come to this, lacks to be the one of where it brings y.
+  [[nodiscard]] double missing_load_kPa(double yielded_mL, double yielding_mL_per_s, double load_kPa,
+                                        const YieldByLoad& by_load, double time_s) const;
   /// Goes on by a step that began with this pressure in the cylinder: what leaks follows it.
   void pass(double cylinder_kPa, double time_s);
 
  private:
   /// What leaks beyond the conductance, mL/s.
   [[nodiscard]] double leaks_beyond(double pressure_kPa, double time_s) const;
-  /// The pressure at which drive, gas and leaks have taken this volume.
-  [[nodiscard]] double pressure_kPa(double absorbed_mL, double time_s) const;
+  /// What drive, gas and leaks have taken with their friction; of a rigid end by the second.
+  [[nodiscard]] double absorbed_mL(double yielded_mL, double yielding_mL_per_s) const;
+  /// The pressure at which they, and what gives way beside them, have taken this volume.
+  [[nodiscard]] double pressure_kPa(double absorbed_mL, double beside_mL_per_kPa, double time_s) const;
 
   double step_s_;
   double compliance_mL_per_kPa_;  ///< of the drive

@@ -118,7 +118,7 @@ struct RigModel {
       1.2;  ///< of p V^n: bubbles at about a hertz are between isothermal (1) and adiabatic (1.4)
   double pump_leak_mL_s_kPa = 0.0;           ///< conductance past the seal
   double drive_compliance_mL_per_kPa = 0.0;  ///< by which screw, piston and cylinder yield
-  /// What leaks past the seal beyond that conductance, which must be positive where there is any.
+  /// What leaks past the seal beyond that conductance.
   std::vector<LeakMaker> pump_leaks;
   std::vector<LossMaker> pump_losses;
   std::vector<LeakMaker> cavity_leaks;

@@ -16,8 +16,8 @@ namespace {
 
 /// A line whose first resonance is slower than this has twice the components: strokes move its higher ones, too.
 constexpr double slow_quarter_wave_Hz = 3.0;
-/// A gas at the pump is not linear: its steps are this many times shorter. So are those of a leak that grows with pressure, which the line
-/// takes for its conductance at rest and a load.
+/// A gas at the pump is not linear: its steps are this many times shorter. So are those of a leak that is not in proportion to the
+/// pressure, which the line takes for a load.
 constexpr double gas_steps = 2.0, leak_steps = 4.0;
 
 void add_turning_errors(const std::array<TurningError, 2>& errors, double turn_mL, DriveTrace& trace) {
@@ -171,9 +171,20 @@ class Plant {
     EndLoads now{
         .piston_acceleration = acceleration, .pump_kPa = -loss_at_pump_kPa(k), .cavity_kPa = cavity_kPa_};
     now.cavity_kPa += model_.hose.loss_at_cavity * turning_loss_kPa(line_.leaving_mL_per_s());
-    now.pump_kPa +=
-        pump_.load_kPa(line_.yielded_mL(), line_.yielding_mL_per_s(), drive_.time_s(k) - copied_s_);
+    if (!pump_.leaks())
+      pump_load_kPa_ =
+          pump_.load_kPa(line_.yielded_mL(), line_.yielding_mL_per_s(), drive_.time_s(k) - copied_s_);
+    now.pump_kPa += pump_load_kPa_;
     return now;
+  }
+  /// At the end of a step, as predicted and for good: the load is that of the state which it makes.
+  void meet_leaks(size_t k) {
+    if (!pump_.leaks()) return;
+    const double missing =
+        pump_.missing_load_kPa(line_.yielded_mL(), line_.yielding_mL_per_s(), pump_load_kPa_,
+                               line_.yield_by_load(), drive_.time_s(k) - copied_s_);
+    line_.add_pump_load(missing);
+    pump_load_kPa_ += missing;
   }
   /// The pressure in the cylinder, where the pump's sensor is.
   [[nodiscard]] double cylinder_kPa(size_t k) const { return line_.pump_kPa() + loss_at_pump_kPa(k); }
@@ -195,6 +206,7 @@ class Plant {
   std::vector<RepeatedSteps> repeated_;
   double copied_s_ = 0.0;  ///< by which the cavity's time is behind
   double cavity_kPa_ = 0.0;
+  double pump_load_kPa_ = 0.0;  ///< of gas, drive and leaks
 };
 
 size_t Plant::beyond_repeated(PlantTrace& trace, size_t k) {
@@ -244,7 +256,9 @@ PlantTrace Plant::run() {
     const double mean = (flow_then - drive_.flow_mL_per_s[k]) / h;
     now.piston_acceleration = mean - 0.5 * rise;
     line_.begin_step(now, flow_then);
+    meet_leaks(k + 1);
     line_.end_step(loads(k + 1, mean + 0.5 * rise));
+    meet_leaks(k + 1);
   }
   return trace;
 }

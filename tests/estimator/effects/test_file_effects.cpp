@@ -288,8 +288,7 @@ TEST(FileEffects, KeepALeakThatIsNothingWhileItIsClosed) {
     rig::RigModel model;
     effect->apply(std::vector{0.05}, {family, {}}, model);
     ASSERT_EQ(model.pump_leaks.size(), 1U) << lost;
-    EXPECT_GT(model.pump_leak_mL_s_kPa, 0.0) << lost;
-    EXPECT_LT(model.pump_leak_mL_s_kPa, 0.01 * 0.05 + 1e-12) << lost;  // as if it never closed quite
+    EXPECT_EQ(model.pump_leak_mL_s_kPa, 0.0) << lost;
     const double open_kPa = lost.find("min(p_pump") != std::string::npos ? -25.0 : 25.0;
     EXPECT_GE(std::abs(model.pump_leaks.front()(place)(open_kPa, 2.0)), 0.05 * 10.0 - 1e-12) << lost;
     rig::RigModel neutral;
@@ -303,13 +302,33 @@ TEST(FileEffects, KeepALeakThatIsNothingWhileItIsClosed) {
   EXPECT_GT(largest_difference(shown(relief.get(), {0.2}), base), 1e-3);
 }
 
-/// A conductance that would be negative, beside which there is no pressure to go by, is none to step by.
+/// A dead band on both sides: at no pressure more is lost than past a seal that is open.
+TEST(FileEffects, LoseNoMoreThroughALeakThatOpensThanThroughAnOpenOne) {
+  const auto open = effect_with("drive", "[equations]\nq_hose = \"q_piston - G * p_pump\"\n");
+  const auto opens = effect_with(
+      "drive",
+      "[equations]\nq_hose = \"q_piston - G * (max(p_pump - 5 [kPa], 0) + min(p_pump + 5 [kPa], 0))\"\n");
+  const rig::Prediction base = shown(nullptr, {});
+  for (const double G : {0.002, 0.05})
+    EXPECT_LT(largest_difference(shown(opens.get(), {G}), base),
+              largest_difference(shown(open.get(), {G}), base))
+        << G;
+}
+
+TEST(FileEffects, LeakAtThePhasesTheySay) {
+  const auto late = effect_with(
+      "drive", "[equations]\nq_hose = \"q_piston - G * p_pump * if(phase > 0.8, phase - 0.8, 0)\"\n");
+  EXPECT_GT(largest_difference(shown(late.get(), {0.05}), shown(nullptr, {})), 1e-3);
+  EXPECT_EQ(shown(late.get(), {0.0}).pump_kPa, shown(nullptr, {}).pump_kPa);
+}
+
+/// A conductance that would be negative is none of the line's.
 TEST(FileEffects, StepByNoNegativeConductance) {
   const BentCurve family;
   const auto source = effect_with("drive", "[equations]\nq_hose = \"q_piston + G * p_pump\"\n");
   rig::RigModel model;
   source->apply(std::vector{0.05}, {family, {}}, model);
-  EXPECT_GT(model.pump_leak_mL_s_kPa, 0.0);
+  EXPECT_EQ(model.pump_leak_mL_s_kPa, 0.0);
   EXPECT_EQ(model.pump_leaks.size(), 1U);
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace diastole::rig {
@@ -176,6 +177,30 @@ TEST(Simulation, ALeakPastAYieldingDriveConvergesInStep) {
     model.drive_compliance_mL_per_kPa = 0.00035;
     expect_second_order(model, 0.2);
   }
+}
+
+/// Whatever yields beside it: what opens takes the place of nearly all that a shut end makes.
+TEST(Simulation, ALeakThatOpensConvergesInStep) {
+  for (const double compliance_mL_per_kPa : {0.0, 1e-6, 0.00035}) {
+    SCOPED_TRACE(compliance_mL_per_kPa);
+    RigModel model = straight_model();
+    model.drive_compliance_mL_per_kPa = compliance_mL_per_kPa;
+    model.pump_leaks.emplace_back(
+        [](const RunPlace&) { return [](double p, double) { return 0.05 * std::max(p - 5.0, 0.0); }; });
+    const PlantTrace coarse = simulate_plant(model, cycles(2));
+    const PlantTrace fine = simulate_plant(model, cycles(2), {.step_s = 1.0 / 2400.0});
+    EXPECT_LT(pump_rms_kPa(coarse, fine, 4), 0.02);  // of +-50 kPa
+  }
+}
+
+TEST(Simulation, ALeakThatShutsAtOnceLeavesAFinitePressure) {
+  RigModel model = straight_model();
+  model.pump_leaks.emplace_back(
+      [](const RunPlace&) { return [](double p, double time_s) { return time_s < 1.0 ? 0.05 * p : 0.0; }; });
+  const PlantTrace trace = simulate_plant(model, cycles(2));
+  // Half a millilitre a second that stops at once is a few kPa in a hose, and more where the piston stands still.
+  EXPECT_LT(std::ranges::max(trace.pump_kPa), 200.0);
+  EXPECT_GT(std::ranges::min(trace.pump_kPa), -200.0);
 }
 
 TEST(Simulation, GasConvergesInStep) {
