@@ -222,6 +222,7 @@ class Reader {
   void read_state(TableReader& table, size_t i) {
     FileState& state = effect_.states[i];
     const PlacedText rate = table.placed_text("rate");
+    state.place = rate.place(0);
     state.rate = expressions::parse_formula_in(rate, scope_, effect_.graph, state_units_[i] / known_unit("s"),
                                                "the rate of " + state.name);
     state.initial = effect_.graph.number(0.0);
@@ -266,9 +267,8 @@ class Reader {
       const NodeId node =
           expressions::parse_formula_in(text, scope_, effect_.graph, known_unit(about.unit), name);
       require_inputs(*law, node, text);
-      require_form(*law, node, text);
-      effect_.laws.push_back({*law, node});
-      asked_.push_back({text, node});
+      make_of_formula(text.file, text.place(0), [&] { require_form(*law, node, text); });
+      effect_.laws.push_back({*law, node, text.place(0)});
     } else if (const In* constant = constant_named(name)) {
       require_port(table, name, port_of(*constant));
       const NodeId node = expressions::parse_formula_in(
@@ -279,8 +279,7 @@ class Reader {
           fail(text, fmt::format("{} is a constant of the rig, but depends on {}", name, name_of_input(i)),
                "Make it of parameters and other constants.");
       }
-      effect_.constants.push_back({*constant, node});
-      asked_.push_back({text, node});
+      effect_.constants.push_back({*constant, node, text.place(0)});
     } else {
       if (!expressions::is_name(name) || has_meaning(name))
         table.fail(name, "has a meaning already and cannot be set",
@@ -425,6 +424,18 @@ class Reader {
 };
 
 }  // namespace
+
+void make_of_formula(const std::string& file, const std::string& place, const std::function<void()>& make) {
+  try {
+    make();
+  } catch (const std::length_error& error) {
+    throw InputError({file, place, error.what(), "Simplify it: its slopes count, too."});
+  } catch (const std::domain_error& error) {
+    throw InputError({file, place, error.what(),
+                      "A division by zero, or a logarithm of what is zero at rest? Every equation and its "
+                      "slopes must be finite there."});
+  }
+}
 
 EffectFile read_effect_file(const std::filesystem::path& path) {
   return Reader(TableReader::from_file(path)).read();

@@ -4,6 +4,7 @@
 // tools/sim_rig for the simulated plant.
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -33,15 +34,18 @@ struct FileState {
   std::string name;
   expressions::NodeId initial = 0;
   expressions::NodeId rate = 0;
+  std::string place = {};  ///< of the rate's formula: "line 12, column 8, key equations.p"
 };
 
 struct FileLaw {
   Out sets;
   expressions::NodeId node = 0;
+  std::string place = {};
 };
 struct FileConstant {
   In sets;
   expressions::NodeId node = 0;
+  std::string place = {};
 };
 
 struct EffectFile {
@@ -64,6 +68,10 @@ struct EffectFile {
   [[nodiscard]] size_t input_of_state(size_t i) const { return quantity_count + parameters.size() + i; }
   [[nodiscard]] size_t inputs() const { return quantity_count + parameters.size() + states.size(); }
 };
+
+/// Makes something of a formula that stands at `place`: slopes, a program. Throws InputError if that is no finite number or too
+/// long.
+void make_of_formula(const std::string& file, const std::string& place, const std::function<void()>& make);
 
 /// Throws InputError with file, line, column, what is wrong and what to change.
 EffectFile read_effect_file(const std::filesystem::path& path);

@@ -8,7 +8,6 @@
 
 #include "estimator/effects/file_states.hpp"
 #include "estimator/expressions/program.hpp"
-#include "protocol/contract/input_error.hpp"
 
 namespace diastole {
 namespace {
@@ -82,6 +81,7 @@ struct Laws {
   [[nodiscard]] bool leaks(std::span<const double> inputs) const;
 
  private:
+  void read_law();
   NodeId rate_of(NodeId node);
 };
 
@@ -103,11 +103,12 @@ NodeId Laws::rate_of(NodeId node) {
 }
 
 Laws::Laws(EffectFile read) : file(std::move(read)) {
-  Graph& graph = file.graph;
   std::vector<NodeId> all;
   for (const auto& constant : file.constants)
     all.push_back(constant.node);
-  constants = Program(graph, all);
+  if (!all.empty())
+    effect_files::make_of_formula(file.file, file.constants.front().place,
+                                  [&] { constants = Program(file.graph, all); });
   std::vector<NodeId> rates, initial;
   for (const auto& state : file.states) {
     rates.push_back(state.rate);
@@ -115,31 +116,40 @@ Laws::Laws(EffectFile read) : file(std::move(read)) {
   }
   all.insert(all.end(), rates.begin(), rates.end());
   if (!file.laws.empty()) {
-    const auto [sets, node] = file.laws.front();
-    all.push_back(node);
-    std::vector<NodeId> outputs{node};
-    const NodeId none = graph.number(0.0);
-    if (sets == Out::V_piston) {
-      has_rates = file.states.empty() && !graph.depends_on(node, index_of(In::q_command)) &&
-                  !graph.depends_on(node, index_of(In::a_command));
-      if (has_rates) outputs = {node, rate_of(node), rate_of(rate_of(node))};
-    } else if (sets == Out::q_hose || sets == Out::q_cavity) {
-      const In flow = sets == Out::q_hose ? In::q_piston : In::q_hose;
-      const size_t pressure = index_of(sets == Out::q_hose ? In::p_pump : In::p_cavity);
-      lost = graph.make(Operation::negate, graph.substituted(node, index_of(flow), none));
-      const NodeId slope = graph.derivative(lost, pressure);
-      outputs = {lost};
-      is_linear = graph.is_number(graph.substituted(lost, pressure, none), 0.0);
-      for (size_t i = 0; i < index_of(effect_files::first_constant); ++i)
-        is_linear = is_linear && !graph.depends_on(slope, i);
-      if (is_linear) conductance = Program(graph, std::vector{slope});
-    } else if (sets == Out::t_seen) {
-      outputs = {graph.substituted(node, index_of(In::t), none), graph.derivative(node, index_of(In::t))};
-    }
-    law = Program(graph, outputs);
+    all.push_back(file.laws.front().node);
+    effect_files::make_of_formula(file.file, file.laws.front().place, [&] { read_law(); });
   }
-  uses_cycle = any_depends(graph, all, In::phase) || any_depends(graph, all, In::cycle);
-  states = StatePrograms(graph, initial, rates, file.input_of_state(0));
+  uses_cycle = any_depends(file.graph, all, In::phase) || any_depends(file.graph, all, In::cycle);
+  if (!rates.empty())
+    effect_files::make_of_formula(file.file, file.states.front().place, [&] {
+      states = StatePrograms(file.graph, initial, rates, file.input_of_state(0));
+    });
+}
+
+void Laws::read_law() {
+  Graph& graph = file.graph;
+  const NodeId node = file.laws.front().node;
+  const Out sets = file.laws.front().sets;
+  std::vector<NodeId> outputs{node};
+  const NodeId none = graph.number(0.0);
+  if (sets == Out::V_piston) {
+    has_rates = file.states.empty() && !graph.depends_on(node, index_of(In::q_command)) &&
+                !graph.depends_on(node, index_of(In::a_command));
+    if (has_rates) outputs = {node, rate_of(node), rate_of(rate_of(node))};
+  } else if (sets == Out::q_hose || sets == Out::q_cavity) {
+    const In flow = sets == Out::q_hose ? In::q_piston : In::q_hose;
+    const size_t pressure = index_of(sets == Out::q_hose ? In::p_pump : In::p_cavity);
+    lost = graph.make(Operation::negate, graph.substituted(node, index_of(flow), none));
+    const NodeId slope = graph.derivative(lost, pressure);
+    outputs = {lost};
+    is_linear = graph.is_number(graph.substituted(lost, pressure, none), 0.0);
+    for (size_t i = 0; i < index_of(effect_files::first_constant); ++i)
+      is_linear = is_linear && !graph.depends_on(slope, i);
+    if (is_linear) conductance = Program(graph, std::vector{slope});
+  } else if (sets == Out::t_seen) {
+    outputs = {graph.substituted(node, index_of(In::t), none), graph.derivative(node, index_of(In::t))};
+  }
+  law = Program(graph, outputs);
 }
 
 bool Laws::leaks(std::span<const double> inputs) const {
@@ -418,15 +428,7 @@ std::shared_ptr<const Effect> make_file_effect(EffectFile file) {
 }
 
 std::shared_ptr<const Effect> read_effect(const std::filesystem::path& file) {
-  try {
-    return make_file_effect(effect_files::read_effect_file(file));
-  } catch (const std::domain_error& error) {  // of a derivative, or at rest
-    throw InputError({file.string(), "table [equations]", error.what(),
-                      "A division by zero, or a logarithm of what is zero at rest? Every equation and its "
-                      "slopes must be finite there."});
-  } catch (const std::length_error& error) {
-    throw InputError({file.string(), "table [equations]", error.what(), "Shorten the equations."});
-  }
+  return make_file_effect(effect_files::read_effect_file(file));
 }
 
 }  // namespace diastole

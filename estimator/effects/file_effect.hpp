@@ -24,6 +24,7 @@
 
 namespace diastole {
 
+/// Throws InputError at a formula of which nothing finite can be made.
 std::shared_ptr<const Effect> make_file_effect(effect_files::EffectFile file);
 
 /// Throws InputError as read_effect_file does.

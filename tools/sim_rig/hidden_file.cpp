@@ -153,7 +153,9 @@ HiddenFile hide_file(const std::string& name, Draw& draw) {
     *of_plant = Program(file.graph, std::vector{constant.node})(inputs.data());
   }
   draw.plant.hose.segments = std::max(draw.plant.hose.segments, segments_for(draw.plant.hose));
-  if (!file.laws.empty()) put_law(file, std::move(inputs), draw.flaws.own);
+  if (!file.laws.empty())
+    effect_files::make_of_formula(file.file, file.laws.front().place,
+                                  [&] { put_law(file, std::move(inputs), draw.flaws.own); });
   return {file.id, file.port};
 }
 
