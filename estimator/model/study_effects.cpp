@@ -18,7 +18,8 @@ EffectLibrary effects_known_to(const Study& study) {
   for (const std::filesystem::path& file : study.effect_files) {
     std::shared_ptr<const Effect> effect = read_effect(file);
     const std::string id(effect->text().id);
-    if (const auto [first, is_new] = read.emplace(id, file); !is_new && first->second != file)
+    if (const auto [first, is_new] = read.emplace(id, file);
+        !is_new && !std::filesystem::equivalent(first->second, file))
       refuse(study, "model.effect_files",
              fmt::format("{} and {} both declare {}", first->second.string(), file.string(), id),
              "Give one of them another id.");

@@ -11,8 +11,10 @@
 
 #include "estimator/effects/effect_library.hpp"
 #include "estimator/effects/file_effect.hpp"
+#include "estimator/model/study_effects.hpp"
 #include "estimator/rig/simulation.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "tests/estimator/io/scratch_file.hpp"
 
 namespace diastole {
 namespace {
@@ -317,6 +319,20 @@ TEST(EffectLibrary, PutsAFilesEffectInPlaceOfTheBuiltInOneOfItsId) {
   library.add(read_effect(file_of("my-seal")));
   EXPECT_EQ(library.all().size(), count + 1);
   EXPECT_EQ(find_effect("my-seal"), nullptr);
+}
+
+TEST(StudyEffects, KnowAFileByWhateverPathNamesIt) {
+  const test::ScratchFolder folder;
+  const fs::path file = folder.path() / "mine.effect.toml";
+  fs::copy(file_of("my-seal"), file);
+  fs::create_symlink(file, folder.path() / "link.effect.toml");
+  Study study;
+  study.file = folder.path() / "a.study.toml";
+  study.effect_files = {file, folder.path() / "." / "mine.effect.toml", folder.path() / "link.effect.toml"};
+  EXPECT_NE(effects_known_to(study).find("my-seal"), nullptr);
+  fs::copy(file, folder.path() / "copy.effect.toml");
+  study.effect_files.push_back(folder.path() / "copy.effect.toml");
+  EXPECT_THROW(effects_known_to(study), InputError);
 }
 
 /// What a page of constants says is what the model has.
