@@ -189,16 +189,23 @@ EffectCheck EffectTrial::found_again() const {
   rig::SessionOptions options{.terms = {{&effect_, {}}}, .values = typical_};
   if (!change_points_.empty()) options.terms.front().change_points = {{"baseline", 3.1, 3.1}};
   options.values.front() = neutral_.front() + part * (typical_.front() - neutral_.front());
+  const rig::Prediction hidden = predicted(options.values);
+  if (!is_finite(hidden)) return {"found again", false, "no finite pressures where it is hidden"};
+  const double changed_kPa = distance_kPa(predicted({}), hidden);
+  if (changed_kPa == 0.0) return {"found again", false, "changes nothing where it is hidden"};
   const rig::Session session = rig::simulated_session(family_, options);
   const rig::SessionProblem problem(session, family_, threads_);
   const EffectSet found = fitted_with(problem);
+  const rig::Prediction shown = predicted(found.model.values);
+  if (!is_finite(shown)) return {"found again", false, "no finite pressures where the search ended"};
   const double off = std::abs(found.model.values[0] - options.values[0]);
-  const bool is_near = off <= 5.0 * found.errors[0] + 0.02 * std::abs(options.values[0]);
+  const double size = std::abs(options.values[0] - neutral_[0]);
+  // What may as well be nothing, or twice as much, is not found.
+  const bool is_near =
+      off <= 5.0 * found.errors[0] + 0.02 * std::abs(options.values[0]) && found.errors[0] < 0.5 * size;
   // Parameters that these data cannot distinguish may lie anywhere, if together they do what the hidden ones do, or if these
   // data are as likely with them: a bubble that a softer specimen stands for as well.
-  const rig::Prediction hidden = predicted(options.values);
-  const double differs =
-      distance_kPa(predicted(found.model.values), hidden) / distance_kPa(predicted({}), hidden);
+  const double differs = distance_kPa(shown, hidden) / changed_kPa;
   const bool does_the_same = differs <= 0.1;  // as right as an effect's equations are taken to be
   constexpr double half_a_nat = 0.5;          // decides nothing
   const rig::LinearisedModel base = rig::declared_rig(problem);
@@ -225,7 +232,10 @@ EffectCheck EffectTrial::found_again() const {
 EffectCheck EffectTrial::silent() const {
   const rig::Session session = rig::simulated_session(family_, {.seed = 7});
   const rig::SessionProblem problem(session, family_, threads_);
-  const double gain = fitted_with(problem).log_posterior - fitted_without(problem).log_posterior;
+  const EffectSet found = fitted_with(problem);
+  if (!is_finite(predicted(found.model.values)))
+    return {"silent without cause", false, "no finite pressures where the search ended"};
+  const double gain = found.log_posterior - fitted_without(problem).log_posterior;
   return {"silent without cause", gain < 0.0, fmt::format("ln odds {:.1f}", gain)};
 }
 

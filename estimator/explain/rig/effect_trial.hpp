@@ -37,8 +37,8 @@ class EffectTrial {
   [[nodiscard]] EffectCheck bounded() const;
   /// The fit's difference is the slope, within a twentieth.
   [[nodiscard]] EffectCheck differentiable() const;
-  /// A search finds its size in data that were made with it, or parameters that these data cannot distinguish from it: they change
-  /// the pressures alike, to a tenth.
+  /// A search finds its size, with an error below half of it, in data that were made with it, or parameters that these data cannot
+  /// distinguish from it: they change the pressures alike, to a tenth.
   [[nodiscard]] EffectCheck found_again() const;
   /// A search prefers the model without it in data that were made without.
   [[nodiscard]] EffectCheck silent() const;
