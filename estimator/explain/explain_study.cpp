@@ -38,12 +38,18 @@ Ids shared(const Ids& ids) {
   return both;
 }
 
-/// Those of the sets that are left open whose effects in both data are these; nothing at all is not one of them, which the other data
-/// exclude. If none but the best is left it is named, and what was said and proposed of the others goes.
+/// Those of the sets that are left open whose effects in both data are these, and their searches; nothing at all is not one of them,
+/// which the other data exclude. If none but the best is left it is named, and what was said and proposed of the others goes.
 void keep_agreeing(Explanation& explanation, const Ids& agreed) {
-  std::erase_if(explanation.ambiguous_with, [&](const Ids& ids) { return shared(ids) != agreed; });
+  const auto disagrees = [&](const Ids& ids) { return shared(ids) != agreed; };
+  std::erase_if(explanation.ambiguous_with, disagrees);
+  std::erase_if(explanation.searches, [&](const SearchEnd& search) {
+    return !search.effects.empty() && disagrees(search.effects);
+  });
+  explanation.converged = is_settled(explanation.searches);
   if (!explanation.ambiguous_with.empty()) return;
-  explanation.verdict = Verdict::named;
+  explanation.verdict = explanation.converged ? Verdict::named : Verdict::unexplained;
+  if (!explanation.converged) explanation.effects.clear();
   explanation.confidence = {};
   explanation.next_experiment = {};
   explanation.summary = summary_of(explanation);

@@ -15,7 +15,9 @@
 // how many were tried). unexplained - structure is left after the best effect, or something outside the library (a motion,
 // one wrong reading of a pressure) gains more than any effect, or a search that the name would rest on did not converge.
 // ambiguous - other effects' scores are within 9 of the best one's; named - none is. The score is the gain of chi2, less 2
-// for each parameter and 2 log(number of places) for a place that was searched.
+// for each parameter and 2 log(number of places) for a place that was searched. Another effect whose search did not converge is weighed by the
+// score that it reached: within 9 it is open as any other, and what its linear model promises beyond is no gain (along the ridges where
+// searches are long, most of it never comes).
 
 #include <functional>
 #include <string>

@@ -307,6 +307,15 @@ size_t without_effects(const rig::SessionProblem& problem, const WeighedSets& se
   return static_cast<size_t>(plain - search.sets.begin());
 }
 
+/// Is the search of another set that is likely enough to be reported not at its end? It would have become likelier.
+bool has_open_rival(const GroupedSets& grouped, const WeighedSets& search) {
+  const Ids& leading = grouped.leading().first;
+  return std::ranges::any_of(grouped.groups, [&](const auto& other) {
+    return other.first != leading && other.second.probability >= least_probability &&
+           !inference::is_settled(search.sets[other.second.best].termination);
+  });
+}
+
 /// Those that are likely enough beside a leading one that is not likely enough.
 void list_rivals(SetVerdict& out, const GroupedSets& grouped, const WeighedSets& search) {
   const Ids& leading = grouped.leading().first;
@@ -361,7 +370,7 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const WeighedSets& sea
         settled ? probability_wrong(is_irregular ? std::min(by_chance, irregular) : by_chance) : 0.5;
     return out;
   }
-  if (out.confidence < name_probability) {
+  if (out.confidence < name_probability || has_open_rival(grouped, search)) {
     out.verdict = Verdict::ambiguous;
     list_rivals(out, grouped, search);
     return out;

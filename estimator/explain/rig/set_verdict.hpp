@@ -34,7 +34,8 @@ struct ErrorKnowledge {
 ///
 ///   unexplained  a part of the model's error, or of the rig, is as far off in 2.3 % by chance, or equal cycles differ as seldom as in
 ///                0.1 %, or a search that the verdict rests on did not settle: of the rig without effects, of the set, of the reference
-///   ambiguous    the leading set has less than nine tenths; the others are those with a twentieth or more
+///   ambiguous    the leading set has less than nine tenths, or the search of another one that has a twentieth or more did not settle: it would
+///                have become likelier. The others are those with a twentieth or more
 ///   ambiguous    with nothing: its prediction of waveforms that were not fitted does not bear its prior odds, and does not exclude it
 ///                either, or the rig without it is as it should be
 ///   unexplained  the prediction excludes it, or a loud tone is left over

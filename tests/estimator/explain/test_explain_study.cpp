@@ -83,6 +83,30 @@ TEST(RunsAndImages, WhatWasSaidOfSetsThatTheOtherDataExcludeGoesWithThem) {
   EXPECT_NE(both.summary.find("lacks radius-error"), std::string::npos) << both.summary;
 }
 
+TEST(RunsAndImages, ASetThatTheOtherDataExcludeNeedsNoSearchThatSettled) {
+  using inference::Termination;
+  Explanation runs = of(Verdict::ambiguous, {"radius-error"}, {{"stroke-gain"}});
+  runs.searches = {{{}, Termination::converged},
+                   {{"radius-error"}, Termination::converged},
+                   {{"stroke-gain"}, Termination::iteration_limit}};
+  runs.converged = false;
+  const Explanation both = merged(std::move(runs), of(Verdict::named, {"radius-error"}));
+  EXPECT_EQ(both.verdict, Verdict::named);
+  EXPECT_TRUE(both.converged);
+  EXPECT_EQ(both.searches.size(), 2U);
+}
+
+TEST(RunsAndImages, NothingIsNamedByASearchThatDidNotSettleWhateverTheOtherDataExclude) {
+  using inference::Termination;
+  Explanation runs = of(Verdict::ambiguous, {"radius-error"}, {{}});
+  runs.searches = {{{}, Termination::converged}, {{"radius-error"}, Termination::stalled}};
+  const Explanation both = merged(std::move(runs), of(Verdict::named, {"radius-error"}));
+  EXPECT_EQ(both.verdict, Verdict::unexplained);
+  EXPECT_FALSE(both.converged);
+  EXPECT_NE(both.summary.find("The search of radius-error did not converge"), std::string::npos)
+      << both.summary;
+}
+
 TEST(RunsAndImages, WhatTheyDisagreeOnStaysOpen) {
   const std::vector<std::vector<std::string>> others{{"stroke-gain"}};
   EXPECT_EQ(

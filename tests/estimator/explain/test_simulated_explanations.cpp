@@ -103,6 +103,24 @@ TEST_F(SimulatedSession, WithALeakIsNotNamedByASearchThatDidNotSettle) {
   EXPECT_EQ(unsettled.confidence, 0.5);
 }
 
+TEST_F(SimulatedSession, WithALeakIsNotNamedBesideALikelySetWhoseSearchDidNotSettle) {
+  search({.terms = {{find_effect("cannula-leak-cavity"), {}}}, .values = {0.15}, .seed = 5});
+  ASSERT_EQ(verdict_.verdict, Verdict::named);
+  EffectSet drifting = plain();
+  drifting.model.terms.push_back({find_effect("sensor-drift"), {}});
+  drifting.model.values.push_back(100.0);
+  WeighedSets made = found_;
+  made.sets = {chosen(), drifting, plain()};
+  made.probability = {0.93, 0.06, 0.01};
+  made.sets[1].termination = inference::Termination::converged;
+  ASSERT_EQ(judge_sets(*problem_, made, {}).verdict, Verdict::named);
+  made.sets[1].termination = inference::Termination::iteration_limit;
+  const SetVerdict open = judge_sets(*problem_, made, {});
+  EXPECT_EQ(open.verdict, Verdict::ambiguous);
+  EXPECT_THAT(open.ambiguous_with, ElementsAre(ElementsAre("sensor-drift")));
+  EXPECT_FALSE(is_settled(open.searches));
+}
+
 TEST_F(SimulatedSession, WithALeakIsNotNamedByAReferenceWhoseSearchDidNotSettle) {
   search({.terms = {{find_effect("cannula-leak-cavity"), {}}}, .values = {0.15}, .seed = 5});
   ASSERT_EQ(judge_sets(*problem_, found_, {true}).verdict, Verdict::named);
