@@ -61,7 +61,7 @@ struct Document {
   Named<ChannelMisfit> channels = {};
   std::string fingerprint;
   size_t sessions = 0;
-  std::optional<inference::Termination> termination = {};
+  inference::Termination termination = inference::Termination::no_solution;
   std::optional<DeclaredHose> rig;
   ErrorShares shares;
   LearntTolerances tolerances;
@@ -70,8 +70,7 @@ struct Document {
 template <class Visit, IsRecord<Document> Record>
 void each_member(Visit&& visit, Record& document) {
   visit("channels", by_name(document.channels));
-  DIASTOLE_VISIT(visit, document, fingerprint, sessions)
-  visit("termination", if_any(document.termination));
+  DIASTOLE_VISIT(visit, document, fingerprint, sessions, termination)
   visit("rig", if_any(document.rig));
   DIASTOLE_VISIT(visit, document, shares, tolerances)
   visit("segments", by_name(document.segments));
@@ -130,7 +129,7 @@ Reference reference_in(const Document& document) {
     take_channel(name, channel, reference);
   reference.fingerprint = document.fingerprint;
   reference.sessions = document.sessions;
-  reference.termination = document.termination.value_or(inference::Termination::converged);
+  reference.termination = document.termination;
   const DeclaredHose hose = document.rig.value_or(DeclaredHose{});
   require_number(hose.hose_length_m, "rig.hose_length_m");
   require_number(hose.hose_bore_mm, "rig.hose_bore_mm");
