@@ -8,6 +8,10 @@ bool is_settled(Termination termination) {
   return termination == Termination::converged || termination == Termination::on_bound;
 }
 
+Termination of_both(Termination first, Termination second) {
+  return is_settled(first) && !is_settled(second) ? second : first;
+}
+
 std::string_view sentence(Termination termination) {
   constexpr std::array<std::string_view, 6> sentences{
       "Converged.",

@@ -17,6 +17,9 @@ enum class Termination {
 /// Whether a search ended where it was to end: converged or on_bound.
 bool is_settled(Termination termination);
 
+/// How that ended which rests on two searches: as the first of them that did not settle, or as the first.
+Termination of_both(Termination first, Termination second);
+
 /// A sentence for a person.
 std::string_view sentence(Termination termination);
 

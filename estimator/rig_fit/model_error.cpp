@@ -191,10 +191,13 @@ EvidenceFit fit_with_shares(const VectorXd& z, const Eigen::MatrixXd& columns, c
       part = std::min(1.0, 2.0 * part);
     } else {
       part *= 0.4;
-      if (part < 1e-3) return fit;
+      if (part < 1e-3) {
+        fit.termination = inference::Termination::stalled;
+        return fit;
+      }
     }
   }
-  fit.settled = false;
+  fit.termination = inference::Termination::iteration_limit;
   return fit;
 }
 

@@ -13,6 +13,7 @@
 #include <array>
 #include <string_view>
 
+#include "estimator/inference/termination.hpp"
 #include "estimator/rig_fit/segment_features.hpp"
 
 namespace diastole::rig {
@@ -53,12 +54,13 @@ struct EvidenceFit {
   Shares shares{};
   double log_evidence = 0.0;
   double chi_square = 0.0;  ///< left' left / variance + u'u
-  bool settled = true;      ///< the shares' search converged
+  /// Of the shares' search; converged where they were given.
+  inference::Termination termination = inference::Termination::converged;
 
   /// By how many of its prior's sds the logarithm of a group's share is larger than expected.
   [[nodiscard]] Shares surprise(const SharePrior& prior) const;
 };
-/// With the shares that make the evidence largest, from `start`.
+/// With the shares that make the evidence largest, from `start`: until a step promises less than a hundredth of a nat.
 EvidenceFit fit_with_shares(const Eigen::VectorXd& z, const Eigen::MatrixXd& columns, const ModelError& error,
                             const Shares& start);
 /// With given shares.

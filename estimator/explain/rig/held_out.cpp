@@ -217,8 +217,12 @@ LinearFeatures smooth_discrepancy(const EffectSet& plain, const MatrixXd& functi
   return with;
 }
 
-double log_pseudo_bayes_factor(const rig::SessionProblem& problem, const EffectSet& plain,
-                               const EffectSet& set) {
+HeldOutGain held_out_gain(const rig::SessionProblem& problem, const EffectSet& plain, const EffectSet& set) {
+  HeldOutGain gain;
+  const auto noted = [&](rig::EvidenceFit fit) {
+    gain.termination = inference::of_both(gain.termination, fit.termination);
+    return fit;
+  };
   const auto freedom = [](const EffectSet& of) {
     size_t count = of.model.values.size();
     for (const rig::ModelTerm& term : of.model.terms)
@@ -233,10 +237,9 @@ double log_pseudo_bayes_factor(const rig::SessionProblem& problem, const EffectS
   const auto of_fold = [&](const LinearFeatures& of, const EffectSet& near,
                            const std::vector<Index>& others) {
     const rig::ModelError error = error_of_rows(problem.error(), others);
-    const rig::Shares shares =
-        fit_with_shares(of.target(others), of.columns(others, Eigen::all), error, near.evidence.shares)
-            .shares;
-    return held_out_density(of, problem.error(), others, shares);
+    const rig::EvidenceFit fit = noted(
+        fit_with_shares(of.target(others), of.columns(others, Eigen::all), error, near.evidence.shares));
+    return held_out_density(of, problem.error(), others, fit.shares);
   };
   const MatrixXd functions = smooth_functions(problem);
   std::vector<Index> all(static_cast<size_t>(problem.features().count()));
@@ -244,11 +247,9 @@ double log_pseudo_bayes_factor(const rig::SessionProblem& problem, const EffectS
   const LinearFeatures of_all = smooth_discrepancy(plain, functions, values, all);
   double with = of_its_parts(set, set.evidence.estimate);
   double without = of_its_parts(plain, plain.evidence.estimate);
-  double smooth =
-      of_its_parts(
-          plain,
-          fit_with_shares(of_all.target, of_all.columns, problem.error(), plain.evidence.shares).estimate) +
-      effects * std::log(effect_odds);
+  const rig::EvidenceFit fit_of_all =
+      noted(fit_with_shares(of_all.target, of_all.columns, problem.error(), plain.evidence.shares));
+  double smooth = of_its_parts(plain, fit_of_all.estimate) + effects * std::log(effect_odds);
   const std::vector<Fold> folds = folds_of(problem);
   for (const Fold& fold : folds) {
     const std::vector<Index> others = fold.others();
@@ -258,7 +259,8 @@ double log_pseudo_bayes_factor(const rig::SessionProblem& problem, const EffectS
     smooth += of_fold(folds.size() > 1 ? smooth_discrepancy(plain, functions, values, others) : of_all, plain,
                       others);
   }
-  return with - std::max(without, smooth);
+  gain.log_pseudo_bayes_factor = with - std::max(without, smooth);
+  return gain;
 }
 
 double log_mean(const std::vector<double>& logarithms) {

@@ -49,10 +49,13 @@ Eigen::MatrixXd smooth_functions(const rig::SessionProblem& problem);
 LinearFeatures smooth_discrepancy(const EffectSet& plain, const Eigen::MatrixXd& functions, size_t count,
                                   const std::vector<Eigen::Index>& rows);
 
+struct HeldOutGain {
+  double log_pseudo_bayes_factor = 0.0;
+  inference::Termination termination = inference::Termination::converged;  ///< of all folds' fits
+};
 /// What a set gains over the better of the models without its effects: ln of the pseudo-Bayes factor, the product over folds of
 /// their predictive densities (S. Geisser, W. F. Eddy, J. Am. Stat. Assoc. 74 (1979) 153) times that of their parts.
-double log_pseudo_bayes_factor(const rig::SessionProblem& problem, const EffectSet& plain,
-                               const EffectSet& set);
+HeldOutGain held_out_gain(const rig::SessionProblem& problem, const EffectSet& plain, const EffectSet& set);
 
 /// ln of the mean of what e to these is.
 double log_mean(const std::vector<double>& logarithms);

@@ -19,6 +19,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using inference::Termination;
 using rig::SessionModel;
 
 constexpr double false_proposals = 0.01;  ///< of sessions in which nothing is missing, at most
@@ -35,18 +36,33 @@ struct LawCandidate {
   CurvePrior prior;
   LawProblem problem;
   LawFit fit;
-  SessionModel at;            ///< where the problem is linearised, without the law
-  VectorXd values;            ///< of the curve there
-  double gain = 0.0;          ///< nats, of all data
-  std::vector<double> gains;  ///< of each fold
+  SessionModel at;                                     ///< where the problem is linearised, without the law
+  VectorXd values;                                     ///< of the curve there
+  double gain = 0.0;                                   ///< nats, of all data
+  std::vector<double> gains;                           ///< of each fold
+  Termination termination = Termination::no_solution;  ///< of the search for its curve, and of all its fits
+};
+
+/// From where a law is linearised towards its fit, halved until the simulated features are better than they were.
+struct LawStep {
+  SessionModel at;
+  VectorXd values;
+  bool is_better = false;
+  /// Mean square, over the error's variance, of what is left there less what the linear model leaves at its fit.
+  double bent = 0.0;
 };
 
 using Progress = std::function<void(std::string_view)>;
 
 class LawSearch {
  public:
-  LawSearch(const rig::SessionProblem& problem, const EffectSet& set, const Progress& progress)
-      : problem_(problem), set_(set), progress_(progress), ranges_(variable_ranges(problem, set.model)) {}
+  LawSearch(const rig::SessionProblem& problem, const EffectSet& set, const Progress& progress,
+            int most_rounds)
+      : problem_(problem),
+        set_(set),
+        progress_(progress),
+        most_rounds_(most_rounds),
+        ranges_(variable_ranges(problem, set.model)) {}
 
   std::vector<LawCandidate> run(const std::vector<Fold>& folds);
   [[nodiscard]] const rig::EvidenceFit& without() const { return without_; }
@@ -71,13 +87,17 @@ class LawSearch {
                                        const std::vector<VectorXd>& curves) const;
   void linearise(LawCandidate& law, const SessionModel& at, const VectorXd& values,
                  const MatrixXd& known) const;
-  /// Ends early where the law falls behind one that gains this much.
-  void refine(LawCandidate& law, double best_gain) const;
+  [[nodiscard]] LawStep step_of(const LawCandidate& law) const;
+  /// Columns of the other unknowns there: anew if they are far from where they were.
+  [[nodiscard]] MatrixXd known_after(const LawCandidate& law, const LawStep& step) const;
+  /// Gauss-Newton, until the linear model predicts what its own step shows. Interrupted where the law falls behind one that gains this much.
+  [[nodiscard]] Termination refine(LawCandidate& law, double best_gain) const;
   void judge(LawCandidate& law, const std::vector<Fold>& folds) const;
 
   const rig::SessionProblem& problem_;
   const EffectSet& set_;
   const Progress& progress_;
+  int most_rounds_;
   VariableRanges ranges_;
   LawProblem base_;  ///< without a law
   rig::EvidenceFit without_;
@@ -138,60 +158,65 @@ void LawSearch::linearise(LawCandidate& law, const SessionModel& at, const Vecto
                        known.rightCols(nuisances()) * at.nuisances;
 }
 
-void LawSearch::refine(LawCandidate& law, double best_gain) const {
-  constexpr int most_rounds = 4;
-  constexpr double straight = 0.1;       // of the error's variance, in the mean
-  constexpr double far = 1.0;            // sds of nuisances
+LawStep LawSearch::step_of(const LawCandidate& law) const {
   constexpr double least_modulus = 0.2;  // times what it was, in a step
-  for (int round = 0; round < most_rounds; ++round) {
+  const VectorXd weight = law.fit.evidence.variance.cwiseInverse();
+  const auto cost = [&](const VectorXd& left, const VectorXd& u) {
+    return left.cwiseAbs2().dot(weight) + u.squaredNorm();
+  };
+  const auto linear_left = [&](const VectorXd& values, const VectorXd& u) -> VectorXd {
+    return law.problem.target - law.problem.responses * values - law.problem.known.rightCols(nuisances()) * u;
+  };
+  LawStep step{.at = law.at, .values = law.fit.values};
+  const VectorXd u = law.fit.evidence.estimate.tail(nuisances());
+  step.at.nuisances = u;
+  // Pressures are in proportion to the modulus, whose logarithm u[0] is.
+  const double sd = problem_.nuisances().front().sd;
+  step.at.nuisances[0] =
+      law.at.nuisances[0] + std::log(std::max(1.0 + sd * (u[0] - law.at.nuisances[0]), least_modulus)) / sd;
+  const VectorXd linear = linear_left(step.values, u);
+  const double before = cost(linear_left(law.values, law.at.nuisances), law.at.nuisances);
+  for (int halving = 0; halving < 4 && !step.is_better; ++halving) {
+    if (halving > 0) {
+      step.at.nuisances = 0.5 * (step.at.nuisances + law.at.nuisances);
+      step.values = 0.5 * (step.values + law.values);
+    }
+    const VectorXd left = problem_.measured() - shown_with(law, step.at, step.values);
+    step.is_better = left.allFinite() && cost(left, step.at.nuisances) < before;
+    step.bent = (left - linear).cwiseAbs2().cwiseProduct(weight).mean();
+  }
+  return step;
+}
+
+MatrixXd LawSearch::known_after(const LawCandidate& law, const LawStep& step) const {
+  constexpr double far = 1.0;  // sds of nuisances
+  MatrixXd known = law.problem.known;
+  if ((step.at.nuisances - law.at.nuisances).norm() <= far) return known;
+  SessionModel with = step.at;
+  const auto effect = effect_of_text(tabulated_law(*law.law, law.knots, at_knots(law, step.values)));
+  with.terms.push_back({effect.get(), {}});
+  with.values.push_back(1.0);
+  VectorXd there;
+  known.rightCols(nuisances()) = problem_.nuisance_columns(with, there);
+  return known;
+}
+
+Termination LawSearch::refine(LawCandidate& law, double best_gain) const {
+  constexpr double straight = 0.1;  // of the error's variance, in the mean
+  for (int round = 0;; ++round) {
     report(fmt::format("learning {} by {}, round {}", law.law->sets, law.law->of, round + 1));
-    const VectorXd weight = law.fit.evidence.variance.cwiseInverse();
-    const auto cost = [&](const VectorXd& left, const VectorXd& u) {
-      return left.cwiseAbs2().dot(weight) + u.squaredNorm();
-    };
-    SessionModel at = law.at;
-    VectorXd values = law.fit.values;
-    at.nuisances = law.fit.evidence.estimate.tail(nuisances());
-    // Pressures are in proportion to the modulus, whose logarithm u[0] is.
-    const double sd = problem_.nuisances().front().sd;
-    at.nuisances[0] =
-        law.at.nuisances[0] +
-        std::log(std::max(1.0 + sd * (at.nuisances[0] - law.at.nuisances[0]), least_modulus)) / sd;
-    const VectorXd linear =
-        law.problem.target - law.problem.responses * values -
-        law.problem.known.rightCols(nuisances()) * law.fit.evidence.estimate.tail(nuisances());
-    const double before = cost(law.problem.target - law.problem.responses * law.values -
-                                   law.problem.known.rightCols(nuisances()) * law.at.nuisances,
-                               law.at.nuisances);
-    VectorXd left;
-    bool is_better = false;
-    for (int halving = 0; halving < 4 && !is_better; ++halving) {
-      if (halving > 0) {
-        at.nuisances = 0.5 * (at.nuisances + law.at.nuisances);
-        values = 0.5 * (values + law.values);
-      }
-      left = problem_.measured() - shown_with(law, at, values);
-      is_better = left.allFinite() && cost(left, at.nuisances) < before;
-    }
-    if (!is_better) return;
-    if ((left - linear).cwiseAbs2().cwiseProduct(weight).mean() < straight) break;
-    MatrixXd known = law.problem.known;
-    if ((at.nuisances - law.at.nuisances).norm() > far) {
-      SessionModel with = at;
-      const auto effect = effect_of_text(tabulated_law(*law.law, law.knots, at_knots(law, values)));
-      with.terms.push_back({effect.get(), {}});
-      with.values.push_back(1.0);
-      VectorXd there;
-      known.rightCols(nuisances()) = problem_.nuisance_columns(with, there);
-    }
+    const LawStep step = step_of(law);
+    if (step.bent < straight) return Termination::converged;
+    if (!step.is_better) return Termination::stalled;
+    if (round == most_rounds_) return Termination::iteration_limit;
     const LawCandidate last = law;
-    linearise(law, at, values, known);
+    linearise(law, step.at, step.values, known_after(law, step));
     if (!law.problem.responses.allFinite()) {
       law = last;
-      return;
+      return Termination::stalled;
     }
     law.fit = fit_law(law.problem, problem_.error(), law.prior, law.fit);
-    if (gain_of(law) < worth_refining * best_gain) return;
+    if (gain_of(law) < worth_refining * best_gain) return Termination::interrupted;
   }
 }
 
@@ -205,6 +230,8 @@ void LawSearch::judge(LawCandidate& law, const std::vector<Fold>& folds) const {
     const LawFit with = fit_law(law.problem.rows(fitted), error, law.prior, law.fit);
     MatrixXd columns(law.problem.known.rows(), with.root.cols() + law.problem.known.cols());
     columns << law.problem.responses * with.root, law.problem.known;
+    law.termination = inference::of_both(law.termination, plain.termination);
+    law.termination = inference::of_both(law.termination, with.evidence.termination);
     law.gains.push_back(
         held_out_density({law.problem.target, columns}, problem_.error(), fitted, with.evidence.shares) -
         held_out_density({base_.target, base_.known}, problem_.error(), fitted, plain.shares));
@@ -236,7 +263,8 @@ std::vector<LawCandidate> LawSearch::run(const std::vector<Fold>& folds) {
   if (laws.size() > laws_refined) laws.erase(laws.begin() + laws_refined, laws.end());
   double best_gain = 0.0;
   for (LawCandidate& law : laws) {
-    refine(law, best_gain);
+    law.termination = inference::of_both(refine(law, best_gain), without_.termination);
+    law.termination = inference::of_both(law.termination, law.fit.evidence.termination);
     best_gain = std::max(best_gain, gain_of(law));
     judge(law, folds);
     law.gain = 0.0;
@@ -282,9 +310,14 @@ CurveEvidence evidence_of(const LawCandidate& law) {
 }
 
 /// What is missing for the best law to be proposed; empty: nothing.
-std::string reason_rejected(const std::vector<double>& gains, const ChangeSize& size, const Gap& gap,
+std::string reason_rejected(const LawCandidate& law, const ChangeSize& size, const Gap& gap,
                             const ErrorKnowledge& known) {
-  if (!predicts_better(gains, port_laws().size()))
+  if (!inference::is_settled(law.termination)) {
+    std::string_view why = inference::sentence(law.termination);
+    why.remove_suffix(1);  // the full stop
+    return fmt::format("is not fitted to its end: its search did not settle. {}", why);
+  }
+  if (!predicts_better(law.gains, port_laws().size()))
     return "does not predict waveforms better that it was not fitted to, beyond what chance does";
   if (size.is_tolerance) return "changes no more than the rig's tolerances may";
   if (size.over_error < known.least_size())
@@ -300,11 +333,11 @@ std::string reason_rejected(const std::vector<double>& gains, const ChangeSize& 
 }  // namespace
 
 Learning learn_term(const rig::SessionProblem& problem, const EffectSet& set, const ErrorKnowledge& known,
-                    const std::function<void(std::string_view)>& progress) {
+                    const std::function<void(std::string_view)>& progress, int most_rounds) {
   const std::vector<Fold> folds = folds_of(problem);
   if (folds.size() < 2) return {{}, "there is one waveform only, and no other to judge a law on"};
   if (progress) progress("learning what no known effect explains");
-  LawSearch search(problem, set, progress);
+  LawSearch search(problem, set, progress, most_rounds);
   const std::vector<LawCandidate> laws = search.run(folds);
   if (laws.empty())
     return {{}, "with none of the laws at a port are these recordings a hundred times as likely"};
@@ -319,7 +352,7 @@ Learning learn_term(const rig::SessionProblem& problem, const EffectSet& set, co
   EffectSet stated = with;
   stated.evidence.variance = problem.error().variance(problem.error().prior.share);
   const Gap gap = held_out_gap(problem, before, stated);
-  if (const std::string lacks = reason_rejected(best.gains, size, gap, known); !lacks.empty())
+  if (const std::string lacks = reason_rejected(best, size, gap, known); !lacks.empty())
     return {{}, fmt::format("the best, {} by {}, {}", best.law->sets, best.law->of, lacks)};
   LearnedTerm term;
   term.port = name_of(best.law->port);

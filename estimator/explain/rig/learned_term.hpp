@@ -11,6 +11,7 @@
 // error, which grows to what the other runs show: a law has to do better than a smooth discrepancy of any size. A law is
 // proposed if
 //
+//   - the search for its curve settled (LawSearch::refine), and those of the error's shares in all of its fits,
 //   - that mean is larger than J/alpha, alpha one in a hundred, and most of the runs gain,
 //   - what it changes is as large as an effect has to be for a name, and no tolerance (set_verdict.hpp),
 //   - it closes half of the gap on what was not fitted: what leaves more is not the law. For the gap only the linear values
@@ -34,8 +35,8 @@ struct Learning {
 };
 
 /// Beside the effects of `set`. `progress` is called with what is done, and with nothing every few simulations; what it throws
-/// ends the search.
+/// ends the search. `most_rounds`: how often a law is linearised again.
 Learning learn_term(const rig::SessionProblem& problem, const EffectSet& set, const ErrorKnowledge& known,
-                    const std::function<void(std::string_view)>& progress = {});
+                    const std::function<void(std::string_view)>& progress = {}, int most_rounds = 4);
 
 }  // namespace diastole::explain

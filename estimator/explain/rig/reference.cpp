@@ -125,13 +125,13 @@ Knowledge learn_tolerances(const Fits& fits, const std::function<void(const std:
   return known;
 }
 
-/// One feature's difference of two references, of the segments that both hold.
-Shares differing_shares(const Fits& fits, const Reference& known) {
+/// From each feature's difference of two references, of the segments that both hold.
+void learn_what_differs(const Fits& fits, Reference& out) {
   if (fits.size() < 2) {
-    Shares shares = known.all;
-    for (double& share : shares)
+    out.again = out.all;
+    for (double& share : out.again)
       share *= std::sqrt(1.0 - once_seen);
-    return shares;
+    return;
   }
   std::vector<double> differences, noise, unit;
   ModelError error;
@@ -152,12 +152,14 @@ Shares differing_shares(const Fits& fits, const Reference& known) {
   const auto rows = static_cast<Index>(differences.size());
   error.noise = Eigen::Map<VectorXd>(noise.data(), rows);
   error.unit = Eigen::Map<VectorXd>(unit.data(), rows);
-  error.prior.share = known.all;
+  error.prior.share = out.all;
   for (double& share : error.prior.share)
     share *= once_seen;
-  return fit_with_shares(Eigen::Map<VectorXd>(differences.data(), rows), MatrixXd(rows, 0), error,
-                         error.prior.share)
-      .shares;
+  const rig::EvidenceFit fit = fit_with_shares(Eigen::Map<VectorXd>(differences.data(), rows),
+                                               MatrixXd(rows, 0), error, error.prior.share);
+  out.termination = inference::of_both(out.termination, fit.termination);
+  for (size_t g = 0; g < error_groups; ++g)
+    out.again[g] = std::min(fit.shares[g], out.all[g]);
 }
 
 /// How large the misfit is that the fits leave: shares of all, and what of it each signal holds.
@@ -260,13 +262,10 @@ Reference learn_reference(const std::vector<Study>& studies, size_t threads,
   report("learning what the rig's model leaves");
   for (const auto& fit : fits) {
     fit->fit(known, known.mean);
-    if (inference::is_settled(out.termination) && !inference::is_settled(fit->termination))
-      out.termination = fit->termination;
+    out.termination = inference::of_both(out.termination, fit->termination);
   }
   measure_misfit(fits, out);
-  out.again = differing_shares(fits, out);
-  for (size_t g = 0; g < error_groups; ++g)
-    out.again[g] = std::min(out.again[g], out.all[g]);
+  learn_what_differs(fits, out);
   learn_common_misfit(fits, out);
   return out;
 }

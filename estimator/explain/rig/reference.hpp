@@ -38,7 +38,7 @@ struct Reference {
   std::array<double, rig::signal_count> percent_of_range{};
   double hose_length_m = 0.0, hose_bore_mm = 0.0;  ///< as the rig declares; 0: not kept
   size_t sessions = 0;
-  /// Of the sessions' last fits: that of the first which did not settle, or converged.
+  /// Of the sessions' last fits and of the shares' that does not come again: that of the first which did not settle, or converged.
   inference::Termination termination = inference::Termination::converged;
   std::string fingerprint;  ///< of the recordings
 };

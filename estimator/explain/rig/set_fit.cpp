@@ -266,7 +266,6 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
                  const rig::Shares& shares, double best_so_far) {
   constexpr double out_of_reach = 50.0;  // nats: rounds after the first bring some
   constexpr int most_rounds = 6;
-  constexpr double rested = 0.5;  // nats
   EffectSet out;
   VectorXd q = set.start();
   const Index searched = set.searched();
@@ -280,8 +279,8 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
     return fit_with_shares(z, columns, problem.error(), from);
   };
   out.evidence = judged(shares);
-  bool at_rest = false;
-  for (int round = 0; round < most_rounds && !at_rest; ++round) {
+  SetRound round;
+  for (int i = 0; i < most_rounds && !round.is_at_rest(); ++i) {
     set.set_variance(out.evidence.variance);
     inference::SearchOptions options;
     options.iteration_limit = 40;  // a bubble and its exponent go a long way along a valley
@@ -291,23 +290,19 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
     options.first_radius = 1e4;
     options.held = set.moments();  // event_scan.hpp; what is shown changes by leaps with them
     const inference::SearchResult found = minimise(set, q, options);
-    out.termination = found.termination;
+    round = {.values = found.termination, .crept = found.crept, .is_first = i == 0};
     if (found.termination == inference::Termination::no_solution) break;
     q = found.q;
     // Slopes by differences to one side hold curvature: a search that they end goes on with those to both.
-    const bool again = found.termination == inference::Termination::stalled && set.differ_to_both_sides();
-    if (!again) set.take(found);
+    round.is_repeated = found.termination == inference::Termination::stalled && set.differ_to_both_sides();
+    if (!round.is_repeated) set.take(found);
     const double before = out.evidence.log_evidence;
     out.evidence = judged(out.evidence.shares);
-    const bool has_no_end = found.crept || found.termination == inference::Termination::iteration_limit;
-    at_rest = !again && !(has_no_end && round == 0) && out.evidence.settled &&
-              std::abs(out.evidence.log_evidence - before) < rested;
-    // Many steps that together bring less than decides anything: it has arrived.
-    if (at_rest && has_no_end) out.termination = inference::Termination::converged;
+    round.shares = out.evidence.termination;
+    round.moved_nats = std::abs(out.evidence.log_evidence - before);
     if (out.evidence.log_evidence + log_prior(problem, set, set.model(q)) < best_so_far - out_of_reach) break;
   }
-  if (!at_rest && inference::is_settled(out.termination))
-    out.termination = inference::Termination::iteration_limit;
+  out.termination = round.termination();
   out.model = set.model(q);
   out.known = {.at = out.model, .there = set.features(q), .columns = known.columns};
   out.known.columns.col(0) = columns.col(searched - 1);
@@ -327,6 +322,19 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
 }
 
 }  // namespace
+
+bool SetRound::has_no_end() const { return crept || values == inference::Termination::iteration_limit; }
+
+bool SetRound::is_at_rest() const {
+  constexpr double decides_nothing = 0.5;
+  return !is_repeated && !(has_no_end() && is_first) && inference::is_settled(shares) &&
+         moved_nats < decides_nothing;
+}
+
+inference::Termination SetRound::termination() const {
+  if (is_at_rest()) return has_no_end() ? inference::Termination::converged : values;
+  return inference::is_settled(values) ? inference::Termination::iteration_limit : values;
+}
 
 EffectSet fit_set(const rig::SessionProblem& problem, const SessionModel& start,
                   const rig::LinearisedModel& known, const rig::Shares& shares, double best_so_far) {

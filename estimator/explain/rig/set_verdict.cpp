@@ -202,15 +202,21 @@ double strain_in_all_by_chance(const rig::SessionProblem& problem, const EffectS
   return inference::chi_square_tail(square, static_cast<double>(known.size()));
 }
 
+struct NameByChance {
+  double probability;
+  inference::Termination termination;  ///< of the fit
+};
+
 /// How often, by chance, the parts of the error are as large beneath this name, or the rig's as far off in all: what its effects
 /// change may be wrong to the part that equations of real parts are.
-double name_by_chance(const rig::SessionProblem& problem, const EffectSet& set, const Sizes& sizes) {
+NameByChance name_by_chance(const rig::SessionProblem& problem, const EffectSet& set, const Sizes& sizes) {
   rig::ModelError error = problem.error();
   error.noise += right_to * right_to * sizes.changed;
   const rig::EvidenceFit again = fit_with_shares(set.target(), set.columns, error, set.evidence.shares);
   const auto parts = static_cast<double>(parts_of(error));
-  return std::min(parts * inference::normal_tail(std::ranges::max(again.surprise(error.prior))),
-                  strain_in_all_by_chance(problem, set, again.estimate.tail(set.model.nuisances.size())));
+  return {std::min(parts * inference::normal_tail(std::ranges::max(again.surprise(error.prior))),
+                   strain_in_all_by_chance(problem, set, again.estimate.tail(set.model.nuisances.size()))),
+          again.termination};
 }
 
 /// ln of the odds of a set on waveforms that it was not fitted to alone: what it gains there has to overcome the effects' prior
@@ -330,6 +336,17 @@ void list_rivals(SetVerdict& out, const GroupedSets& grouped, const WeighedSets&
   }
 }
 
+/// name_by_chance's probability; the verdict gets what the set gains on waveforms that it was not fitted to, and how all of its fits ended.
+double weigh_name(const rig::SessionProblem& problem, const EffectSet& plain, const EffectSet& best,
+                  const Sizes& sizes, SetVerdict& out) {
+  const NameByChance chance = name_by_chance(problem, best, sizes);
+  const HeldOutGain gain = held_out_gain(problem, plain, best);
+  out.log_pseudo_bayes_factor = gain.log_pseudo_bayes_factor;
+  const inference::Termination beside = inference::of_both(chance.termination, gain.termination);
+  out.searches.push_back({best.ids(), inference::of_both(best.termination, beside)});
+  return chance.probability;
+}
+
 }  // namespace
 
 SetVerdict judge_sets(const rig::SessionProblem& problem, const WeighedSets& search,
@@ -352,17 +369,15 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const WeighedSets& sea
     out.searches.push_back({{}, error.reference_termination, true});
   // Hints alone need no search that settled: nothing is named by it.
   const bool is_more = ids.size() > search.given;
-  if (is_more) out.searches.push_back({best.ids(), best.termination});
   // That nothing is wrong holds with the hints or, unless the data exclude it, without them.
   const bool may_be_plain = search.probability[out.plain] >= considered;
-  const double by_chance = is_more ? name_by_chance(problem, best, sizes)
+  const double by_chance = is_more ? weigh_name(problem, plain, best, sizes, out)
                                    : std::max(nothing_wrong_by_chance(problem, best),
                                               may_be_plain ? nothing_wrong_by_chance(problem, plain) : 0.0);
   out.scatter = rig::cycle_scatter(problem, best.model);
   out.tone = material_tone(problem, best, error);
   const double irregular = irregularity_by_chance(problem, out.scatter);
   const bool settled = is_settled(out.searches);
-  if (is_more) out.log_pseudo_bayes_factor = log_pseudo_bayes_factor(problem, plain, best);
   const bool is_irregular = irregular < irregular_by_chance;
   if (by_chance <= surprising_by_chance || is_irregular || !settled) {
     out.verdict = Verdict::unexplained;

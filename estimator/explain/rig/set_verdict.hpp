@@ -33,7 +33,8 @@ struct ErrorKnowledge {
 /// the model's error or than a tenth of the largest one, or that tolerances make as well.
 ///
 ///   unexplained  a part of the model's error, or of the rig, is as far off in 2.3 % by chance, or equal cycles differ as seldom as in
-///                0.1 %, or a search that the verdict rests on did not settle: of the rig without effects, of the set, of the reference
+///                0.1 %, or a search that the verdict rests on did not settle: of the rig without effects, of the set (to all data and to
+///                those of each fold), of the reference
 ///   ambiguous    the leading set has less than nine tenths, or the search of another one that has a twentieth or more did not settle: it would
 ///                have become likelier. The others are those with a twentieth or more
 ///   ambiguous    with nothing: its prediction of waveforms that were not fitted does not bear its prior odds, and does not exclude it
@@ -55,7 +56,7 @@ struct SetVerdict {
   bool is_tone_alone = false;          ///< nothing else is unexplained
   std::optional<rig::Tone> tone = {};  ///< if it is louder than the noise and material as an effect has to be
   std::vector<SearchEnd> searches;
-  /// Of the leading set, if it has more than the given effects: log_pseudo_bayes_factor()'s.
+  /// Of the leading set, if it has more than the given effects: held_out_gain()'s.
   std::optional<double> log_pseudo_bayes_factor = {};
 };
 

@@ -4,10 +4,43 @@
 
 #include <algorithm>
 
+#include "estimator/explain/rig/set_fit.hpp"
 #include "estimator/rig_fit/simulated_session.hpp"
 
 namespace diastole::explain {
 namespace {
+
+TEST(SetRound, ASearchThatGoesOnWithoutEffectOnTheEvidenceHasConverged) {
+  using enum inference::Termination;
+  const SetRound later{.values = converged, .shares = converged, .moved_nats = 0.4};
+  EXPECT_EQ(later.termination(), converged);
+  for (const SetRound& endless :
+       {SetRound{.values = iteration_limit, .shares = converged, .moved_nats = 0.4},
+        SetRound{.values = stalled, .crept = true, .shares = converged, .moved_nats = 0.4}}) {
+    EXPECT_TRUE(endless.is_at_rest());
+    EXPECT_EQ(endless.termination(), converged);
+    SetRound other = endless;
+    other.is_first = true;
+    EXPECT_EQ(other.termination(), endless.values);
+    other = endless;
+    other.moved_nats = 0.6;
+    EXPECT_EQ(other.termination(), endless.values);
+    other = endless;
+    other.shares = iteration_limit;
+    EXPECT_EQ(other.termination(), endless.values);
+  }
+}
+
+TEST(SetRound, OfASearchThatSettledTheEvidenceHasToRest) {
+  using enum inference::Termination;
+  EXPECT_EQ((SetRound{.values = converged, .shares = converged, .moved_nats = 0.6}.termination()),
+            iteration_limit);
+  EXPECT_EQ((SetRound{.values = converged, .shares = stalled, .moved_nats = 0.1}.termination()),
+            iteration_limit);
+  EXPECT_EQ((SetRound{.values = stalled, .shares = converged, .moved_nats = 0.1}.termination()), stalled);
+  EXPECT_FALSE((
+      SetRound{.values = stalled, .shares = converged, .moved_nats = 0.1, .is_repeated = true}.is_at_rest()));
+}
 
 TEST(EffectSets, AnEffectIsWeighedAgainstTheToleranceThatDoesTheSame) {
   // The lag of the fluid near the hose's wall (sd 5 %) would have to weigh 24 % more.

@@ -70,7 +70,15 @@ TEST_F(HeldOut, SmoothDiscrepanciesAreThoseThatExplainMost) {
 
 TEST_F(HeldOut, NothingIsGainedByWhatChangesNothing) {
   record(3);
-  EXPECT_NEAR(log_pseudo_bayes_factor(*problem_, plain_, plain_), 0.0, 1e-6);
+  EXPECT_NEAR(held_out_gain(*problem_, plain_, plain_).log_pseudo_bayes_factor, 0.0, 1e-6);
+}
+
+TEST_F(HeldOut, AFoldWhoseSearchDidNotSettleIsReported) {
+  record(3);
+  EXPECT_EQ(held_out_gain(*problem_, plain_, plain_).termination, inference::Termination::converged);
+  EffectSet far = plain_;
+  far.evidence.shares.fill(1e30);  // of the model's error: farther than a search for it goes
+  EXPECT_EQ(held_out_gain(*problem_, far, plain_).termination, inference::Termination::iteration_limit);
 }
 
 TEST_F(HeldOut, PartsFarOffAreSeldom) {

@@ -46,10 +46,13 @@ class LearnedTerms : public testing::Test {
     const rig::LinearisedModel base = rig::declared_rig(problem);
     const EffectSet plain =
         fit_set_exactly(problem, fit_set(problem, base.at, base, problem.error().prior.share));
-    Learning learning = learn_term(problem, plain, {}, [this](std::string_view) {
-      ++asked_;
-      if (asked_ == ends_at_) throw Ended{};
-    });
+    Learning learning = learn_term(
+        problem, plain, {},
+        [this](std::string_view) {
+          ++asked_;
+          if (asked_ == ends_at_) throw Ended{};
+        },
+        most_rounds_);
     lacks_ = std::move(learning.lacks);
     return std::move(learning.term);
   }
@@ -66,6 +69,7 @@ class LearnedTerms : public testing::Test {
   std::string lacks_;
   size_t asked_ = 0;
   size_t ends_at_ = 0;
+  int most_rounds_ = 4;
 };
 
 TEST_F(LearnedTerms, AreNotProposedWhereNothingIsMissing) {
@@ -92,6 +96,13 @@ TEST_F(LearnedTerms, FindAFlapAtThePumpAndPredictOtherWaveforms) {
   EXPECT_GT(term->gap.closed, 0.7);
   EXPECT_GE(part_inside(*term, [](double q) { return 20.0 * std::pow(std::max(q / 100.0, 0.0), 2); }),
             least_inside);
+}
+
+TEST_F(LearnedTerms, AreNotProposedBySearchesThatDidNotSettle) {
+  most_rounds_ = 0;
+  EXPECT_FALSE(
+      learnt(hidden("drive", "p_pump = \"p_pump + a * 20 [kPa] * max(q_hose / 100 [mL/s], 0)^2\""), 21));
+  EXPECT_THAT(lacks_, HasSubstr("its search did not settle. Stopped at the limit"));
 }
 
 TEST_F(LearnedTerms, FindFrictionOfTheSpecimen) {

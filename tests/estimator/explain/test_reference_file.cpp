@@ -93,9 +93,8 @@ std::string refusal_of_spoilt(const std::function<void(nlohmann::json&)>& spoil)
 
 TEST(Reference, ThatLacksSomethingIsRefusedWithItsPlaceInWordsOfOurs) {
   using testing::HasSubstr;
-  for (const char* key :
-       {"format_version", "channels", "fingerprint", "sessions", "termination", "shares", "tolerances",
-        "segments"}) {
+  for (const char* key : {"format_version", "channels", "fingerprint", "sessions", "termination", "shares",
+                          "tolerances", "segments"}) {
     const std::string refusal = refusal_of_spoilt([&](auto& document) { document.erase(key); });
     EXPECT_THAT(refusal, HasSubstr(fmt::format("rig.reference.json: key {}: is missing", key)));
     EXPECT_THAT(refusal, HasSubstr("diastole reference STUDY"));

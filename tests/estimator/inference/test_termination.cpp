@@ -76,6 +76,14 @@ TEST(Termination, NoSolution) {
   EXPECT_EQ(found.residuals.size(), 0);
 }
 
+TEST(Termination, WhatRestsOnTwoSearchesHasSettledIfBothDid) {
+  using enum Termination;
+  EXPECT_EQ(of_both(on_bound, converged), on_bound);
+  EXPECT_EQ(of_both(converged, stalled), stalled);
+  EXPECT_EQ(of_both(iteration_limit, converged), iteration_limit);
+  EXPECT_EQ(of_both(iteration_limit, stalled), iteration_limit);
+}
+
 TEST(Termination, OnlySettledSearchesAreSettled) {
   for (const Termination each :
        {Termination::converged, Termination::on_bound, Termination::stalled, Termination::iteration_limit,

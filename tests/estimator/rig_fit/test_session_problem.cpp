@@ -70,11 +70,24 @@ TEST(ModelError, ItsShareIsFoundWithinItsPrior) {
   const Eigen::MatrixXd none(error.noise.size(), 0);
   for (const double share : {0.001, 0.005, 0.02}) {
     const EvidenceFit fit = fit_with_shares(errors_of(error, share, 7), none, error, error.prior.share);
-    EXPECT_TRUE(fit.settled);
+    EXPECT_EQ(fit.termination, inference::Termination::converged);
     EXPECT_NEAR(std::log(fit.shares[0] / share), 0.0, 0.3) << share;
     EXPECT_GE(fit.log_evidence,
               fit_linear(errors_of(error, share, 7), none, error, error.prior.share).log_evidence);
   }
+}
+
+TEST(ModelError, ASearchOfItsSharesThatEndsTooEarlyReportsThat) {
+  const SpecimenFamily family = gel_family();
+  const Session session = simulated_session(family, {});
+  const ModelError error = model_error_of(SegmentFeatures(session, estimate_noise(session), 1));
+  const Eigen::MatrixXd none(error.noise.size(), 0);
+  Shares far{};
+  far.fill(1e30);  // more than forty steps of a factor of e away
+  VectorXd z = errors_of(error, 0.005, 7);
+  EXPECT_EQ(fit_with_shares(z, none, error, far).termination, inference::Termination::iteration_limit);
+  z[0] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(fit_with_shares(z, none, error, error.prior.share).termination, inference::Termination::stalled);
 }
 
 TEST(SessionProblem, FindsTheModulusOfItsOwnModel) {
