@@ -1,5 +1,7 @@
 #include "estimator/fit/fit.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -14,8 +16,6 @@ namespace {
 
 using inference::Termination;
 
-// The choice of usable points settles in one or two searches, those of smoothness and loss in two or three.
-constexpr int most_searches = 8;
 constexpr double least_wild = 3.0;        // residuals; chance makes one in two million
 constexpr double wild_share = 0.001;      // of all residuals
 constexpr double scale_tolerance = 0.02;  // of the robust loss' scale
@@ -76,8 +76,9 @@ inference::SearchStep in_own_units(inference::SearchStep step, const JointProble
   return step;
 }
 
-inference::SearchResult search_from(JointProblem& problem, const Eigen::VectorXd& q, FitOutcome& outcome,
-                                    const FitOptions& options, bool roughly) {
+/// Searches from q on, to where it ended, and keeps how.
+void search_from(JointProblem& problem, Eigen::VectorXd& q, FitOutcome& outcome, const FitOptions& options,
+                 bool roughly) {
   inference::SearchOptions settings = options.search;
   if (roughly) settings.cost_tolerance = rough_tolerance;
   settings.iterations_before = outcome.iterations;
@@ -88,7 +89,51 @@ inference::SearchResult search_from(JointProblem& problem, const Eigen::VectorXd
     outcome.history.back().iteration = static_cast<int>(outcome.history.size()) - 1;
     if (options.on_step) options.on_step(outcome.history.back());
   };
-  return inference::minimise(problem, q, settings);
+  inference::SearchResult found = inference::minimise(problem, q, settings);
+  q = std::move(found.q);
+  outcome.termination = found.termination;
+  outcome.reason = std::move(found.reason);
+  outcome.iterations += found.iterations;
+}
+
+/// What a search rests on beside the unknowns: which points lie on the body depends on the motion, how smooth the values are and how wild
+/// residuals are on the data. Chosen anew at q; returns whether something is other than it was, nothing where the model has no solution.
+std::optional<bool> choose_anew(JointProblem& problem, const Eigen::VectorXd& q, const FitOptions& options) {
+  const std::optional<size_t> gained = problem.find_points(q);
+  if (!gained) return {};
+  const bool other_smoothness = choose_smoothness(problem, q, options);
+  const bool other_loss = problem.residuals(q) && choose_loss(problem, options);
+  return *gained > 0 || other_smoothness || other_loss;
+}
+
+void conclude(FitOutcome& outcome, Termination termination, std::string reason) {
+  outcome.termination = termination;
+  outcome.reason = std::move(reason);
+}
+
+/// Searches again and again, until what a search rests on is the same where it ended.
+void search_until_same(JointProblem& problem, Eigen::VectorXd& q, FitOutcome& outcome,
+                       const FitOptions& options) {
+  if (!problem.find_points(q))
+    return conclude(outcome, Termination::no_solution, "Failed: " + problem.failure() + ".");
+  require_any_usable(problem, options.file);
+  const bool prepares = any_by_evidence(options);  // the first search, for the choice of the smoothness
+  for (int search = 1;; ++search) {
+    search_from(problem, q, outcome, options, search == 1 && prepares);
+    const bool stalled = outcome.termination == Termination::stalled;
+    if (!outcome.converged() && !stalled) return;
+    // Tags that come and go from trial to trial make the cost jump: without them it goes on. So do wild ones that change
+    // sides: under a loss that hardly feels them it goes on, too, if the residuals ask for one.
+    const bool lost = stalled && problem.give_up_lost() > 0;
+    const std::optional<bool> is_other = choose_anew(problem, q, options);
+    if (!is_other) return conclude(outcome, Termination::no_solution, "Failed: " + problem.failure() + ".");
+    if (!*is_other && !lost && !(search == 1 && prepares)) return;
+    if (search == options.most_searches)
+      return conclude(outcome, Termination::iteration_limit,
+                      fmt::format("Stopped after {} searches: where the last one ended other points lie on "
+                                  "the body, or another smoothness or loss fits.",
+                                  search));
+  }
 }
 
 bool is_interrupted(const FitOptions& options) {
@@ -181,41 +226,12 @@ FitOutcome fit_motion(MotionModel& model, const std::vector<EstimatedParameter>&
   Eigen::VectorXd q = problem.start();
   problem.set_smoothness(smooth_blocks(model, options));
   if (options.robustness == Robustness::always) problem.set_robust(RobustLoss::for_deviation(1));
-  // Which points lie on the body depends on the motion, and how smooth the values are depends on the data: search
-  // again while a better motion finds more points or another smoothness.
-  bool again = true;
-  for (int search = 0; search < most_searches; ++search) {
-    const std::optional<size_t> gained = problem.find_points(q);
-    if (!gained) {
-      outcome.reason = "Failed: " + problem.failure() + ".";
-      break;
-    }
-    if (search == 0) require_any_usable(problem, options.file);
-    const bool roughly = search == 0 && any_by_evidence(options);
-    const bool prepared = search == 1 && any_by_evidence(options);
-    const bool other_smoothness = search > 0 && choose_smoothness(problem, q, options);
-    const bool other_loss = search > 0 && problem.residuals(q) && choose_loss(problem, options);
-    if (*gained == 0 && !other_smoothness && !other_loss && !prepared && !again) break;
-    inference::SearchResult found = search_from(problem, q, outcome, options, roughly);
-    q = found.q;
-    outcome.termination = found.termination;
-    outcome.reason = std::move(found.reason);
-    outcome.iterations += found.iterations;
-    const bool stalled = found.termination == Termination::stalled;
-    // Tags that come and go from trial to trial make the cost jump: without them it goes on. So do wild ones that change
-    // sides: under a loss that hardly feels them it goes on, too, if the residuals ask for one.
-    again = stalled && problem.give_up_lost() > 0;
-    if (!outcome.converged() && !stalled) break;
-  }
+  search_until_same(problem, q, outcome, options);
   if (outcome.converged() && options.correction) {
     if (const std::optional<Eigen::VectorXd> correction = options.correction(problem, q)) {
       problem.set_correction(*correction);
       outcome.corrected = std::sqrt(correction->squaredNorm() / static_cast<double>(correction->size()));
-      inference::SearchResult found = search_from(problem, q, outcome, options, false);
-      q = found.q;
-      outcome.termination = found.termination;
-      outcome.reason = std::move(found.reason);
-      outcome.iterations += found.iterations;
+      search_from(problem, q, outcome, options, false);
     }
   }
   if (outcome.converged()) require_half_usable(point_share(problem), options.file);

@@ -44,7 +44,10 @@ enum class Robustness {
 struct FitOptions {
   std::string file;                 ///< named in errors
   inference::SearchOptions search;  ///< its on_step is not used
-  LocatorOptions locator;           ///< how far outside the body a point may lie
+  /// Searches follow one another as long as where one ended other points lie on the body, or another smoothness or loss fits: one to three
+  /// as a rule. So many at most.
+  int most_searches = 8;
+  LocatorOptions locator;  ///< how far outside the body a point may lie
   std::vector<SmoothRegion> smooth;
   Robustness robustness = Robustness::if_needed;
   /// All frame pressures may be off by one and the same unknown amount, 0 with this standard deviation.

@@ -61,10 +61,11 @@ class WildPoints : public testing::Test {
     }
     return measurement;
   }
-  static FitOutcome fit(const Measurement& measurement, Robustness robustness) {
+  static FitOutcome fit(const Measurement& measurement, Robustness robustness, int most_searches = 8) {
     ElasticMotion motion(test::coarse_gel(6), {whole_parameter(0)});
     FitOptions options;
     options.robustness = robustness;
+    options.most_searches = most_searches;
     return fit_motion(motion, {{6.0, 1.0, 15.0}}, measurement, options);
   }
 };
@@ -79,6 +80,13 @@ TEST_F(WildPoints, FivePerCentOfThemDoNotMoveTheStiffness) {
     EXPECT_NEAR(found.values[0].value, 8.71, 3 * found.values[0].se);
     EXPECT_GT(std::abs(fit(measured(20, seed), Robustness::never).values[0].value / clean - 1), 0.05);
   }
+}
+
+TEST_F(WildPoints, ALossThatWasChosenAfterTheLastSearchLeavesTheFitUnfinished) {
+  const FitOutcome found = fit(measured(20, 1), Robustness::if_needed, 1);
+  EXPECT_EQ(found.termination, inference::Termination::iteration_limit);
+  EXPECT_TRUE(found.reason.starts_with("Stopped after 1 searches")) << found.reason;
+  EXPECT_TRUE(fit(measured(0, 1), Robustness::if_needed, 1).converged());
 }
 
 /// Tags in three frames, each with a probability of 5 % thrown by up to `most_mm` along every axis: many of them
