@@ -29,6 +29,29 @@ void LinearModel::move_to(const Eigen::VectorXd& to, const Eigen::VectorXd& resi
   residuals = residuals_there;
 }
 
+void move_to_minimum(LinearModel& model, const ParameterSpace& space, std::vector<bool>& is_free) {
+  for (bool is_stopped = true; is_stopped;) {
+    std::vector<Eigen::Index> free;
+    for (Eigen::Index i = 0; i < space.size(); ++i)
+      if (is_free[static_cast<size_t>(i)]) free.push_back(i);
+    if (free.empty()) return;
+    const Eigen::MatrixXd columns = model.jacobian(Eigen::all, free);
+    Eigen::VectorXd wanted = model.q;
+    wanted(free) -= columns.colPivHouseholderQr().solve(model.residuals);
+    const Eigen::VectorXd within = space.clamped(wanted);
+    is_stopped = within != wanted;
+    // Where a bound stops some of them they alone go there, and the others are sought anew beside them.
+    Eigen::VectorXd to = is_stopped ? model.q : wanted;
+    for (const Eigen::Index i : free) {
+      if (within[i] == wanted[i]) continue;
+      to[i] = within[i];
+      is_free[static_cast<size_t>(i)] = false;
+    }
+    model.residuals += columns * (to - model.q)(free);
+    model.q = to;
+  }
+}
+
 std::vector<bool> pressed_on_bounds(const LinearModel& model, const ParameterSpace& space) {
   const Eigen::VectorXd gradient = model.jacobian.transpose() * model.residuals;
   std::vector<bool> pressed;

@@ -13,6 +13,7 @@
 #include "estimator/inference/covariance.hpp"
 #include "estimator/inference/intervals.hpp"
 #include "estimator/inference/least_squares.hpp"
+#include "estimator/inference/linear_model.hpp"
 #include "estimator/model/affected_model.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -254,23 +255,20 @@ void SpecimenProblem::take(const inference::SearchResult& found, JointProblem& p
   fit.termination = found.termination;
   fit.jacobian = MatrixXd::Zero(own + tolerances, unknowns + tolerances);
   fit.jacobian.topLeftCorner(own, unknowns) = problem.jacobian(found.q);
-  VectorXd residuals = VectorXd::Zero(own + tolerances);
-  residuals.head(own) = found.residuals;
-  VectorXd q = found.q;
+  inference::LinearModel at{found.q, found.residuals, {}};
   if (tolerances > 0) {
     fit.jacobian.topRightCorner(own, tolerances).topRows(rows) = tolerances_;
     fit.jacobian.bottomRightCorner(tolerances, tolerances).setIdentity();
-    std::vector<Index> free;
-    for (Index i = 0; i < unknowns + tolerances; ++i)
-      if (is_free[static_cast<size_t>(i)]) free.push_back(i);
-    const MatrixXd columns = fit.jacobian(Eigen::all, free);
-    const VectorXd step = -columns.colPivHouseholderQr().solve(residuals);
-    residuals += columns * step;
-    for (size_t i = 0; i < free.size(); ++i)
-      if (free[i] < unknowns) q[free[i]] += step[static_cast<Index>(i)];
-    q = problem.space().clamped(q);
+    std::vector<inference::Parameter> all(static_cast<size_t>(unknowns + tolerances), {.name = "tolerance"});
+    for (Index i = 0; i < unknowns; ++i)
+      all[static_cast<size_t>(i)] = problem.space()[i];
+    at.jacobian = fit.jacobian;
+    at.q.conservativeResizeLike(VectorXd::Zero(unknowns + tolerances));
+    at.residuals.conservativeResizeLike(VectorXd::Zero(own + tolerances));
+    move_to_minimum(at, inference::ParameterSpace(std::move(all)), is_free);
   }
-  const std::vector<double> values = problem.space().values(q);
+  const VectorXd& residuals = at.residuals;
+  const std::vector<double> values = problem.space().values(at.q.head(unknowns));
   const size_t law = estimated_.values.size();
   fit.law.assign(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(law));
   for (size_t i = 0; i < fit.choice.free.size(); ++i) {

@@ -1,0 +1,42 @@
+#include "estimator/inference/linear_model.hpp"
+
+namespace diastole::inference {
+namespace {
+
+/// chi-square = (x + y - 3)^2 + (x - y)^2 / 4 + z^2, from nothing.
+LinearModel three_unknowns() {
+  LinearModel model{Eigen::Vector3d::Zero(), Eigen::Vector3d(-3.0, 0.0, 0.0), {}};
+  model.jacobian = Eigen::Matrix3d{{1.0, 1.0, 0.0}, {0.5, -0.5, 0.0}, {0.0, 0.0, 1.0}};
+  return model;
+}
+
+TEST(LinearModel, MovesToItsMinimum) {
+  LinearModel model = three_unknowns();
+  std::vector<bool> is_free(3, true);
+  move_to_minimum(model, ParameterSpace({{"x"}, {"y"}, {"z"}}), is_free);
+  EXPECT_LT((model.q - Eigen::Vector3d(1.5, 1.5, 0.0)).norm(), 1e-12);
+  EXPECT_LT(model.chi_square(), 1e-24);
+  EXPECT_EQ(is_free, std::vector<bool>(3, true));
+}
+
+TEST(LinearModel, BesideABoundThatStopsOneTheOthersHaveTheirOwnMinimum) {
+  LinearModel model = three_unknowns();
+  std::vector<bool> is_free(3, true);
+  move_to_minimum(model, ParameterSpace({{"x", "", 0.0, 0.5}, {"y"}, {"z"}}), is_free);
+  // At x = 0.5 chi-square is least where y - 2.5 + (y - 0.5) / 4 = 0.
+  EXPECT_LT((model.q - Eigen::Vector3d(0.5, 2.1, 0.0)).norm(), 1e-12);
+  EXPECT_NEAR(model.chi_square(), 0.4 * 0.4 + 1.6 * 1.6 / 4.0, 1e-12);
+  EXPECT_EQ(is_free, std::vector<bool>({false, true, true}));
+}
+
+TEST(LinearModel, WhatIsNotFreeStays) {
+  LinearModel model = three_unknowns();
+  std::vector<bool> is_free{false, true, false};
+  move_to_minimum(model, ParameterSpace({{"x"}, {"y", "", 0.0, 1.0}, {"z"}}), is_free);
+  EXPECT_EQ(model.q, Eigen::Vector3d(0.0, 1.0, 0.0));
+  EXPECT_NEAR(model.chi_square(), 4.25, 1e-12);
+  EXPECT_EQ(is_free, std::vector<bool>(3, false));
+}
+
+}  // namespace
+}  // namespace diastole::inference
