@@ -16,6 +16,7 @@
 #include "estimator/explain/verdict/explained_study.hpp"
 #include "estimator/explain/verdict/explanation_json.hpp"
 #include "estimator/explain/verdict/learned_file.hpp"
+#include "estimator/explain/verdict/verdict.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "estimator/model/study_effects.hpp"
 #include "estimator/reconstruction/study_reconstruction.hpp"
@@ -31,7 +32,6 @@ namespace fs = std::filesystem;
 constexpr std::string_view explanation_file = "explanation.json";
 constexpr std::string_view study_file = "explained.study.toml";
 constexpr std::string_view report_file = "report.html";
-constexpr std::string_view learned_file = "learned.effect.toml";
 constexpr std::string_view study_mark = "# Written by diastole explain";
 
 struct ExplainArguments {
@@ -67,8 +67,7 @@ std::string place_of(const explain::Misfit& misfit) {
 }
 
 void print_learned(const explain::LearnedTerm& term) {
-  fmt::print("\nLearnt, a suggestion: at the port {}, {} by {}\n", term.port, term.sets,
-             fmt::join(term.variables, " and "));
+  fmt::print("\nLearnt, a suggestion: {}\n", place_of(term));
   for (const std::string& reading : term.readings)
     fmt::print("  {}\n", reading);
   if (!term.closed_form.empty()) fmt::print("  within its band: {}\n", term.closed_form);
@@ -78,7 +77,7 @@ void print_learned(const explain::LearnedTerm& term) {
     fmt::print("  {:<18} {:.4f} +- {:.4f} without, {:.4f} +- {:.4f} with it\n", shift.name, shift.before,
                shift.before_error, shift.after, shift.after_error);
   for (const explain::LearnedRival& rival : term.rivals)
-    fmt::print("  as good: at the port {}, {} by {}\n", rival.port, rival.sets,
+    fmt::print("  as good: {}, at the port {}, {} by {}\n", rival.effect_file, rival.port, rival.sets,
                fmt::join(rival.variables, " and "));
 }
 
@@ -116,7 +115,7 @@ void print_for_people(const explain::Explanation& found, const fs::path& folder)
   if (found.next_experiment) fmt::print("\nNext: {}\n", found.next_experiment->reason);
   fmt::print("\nIn {}: {}, {}{}{}\n", folder.string(), explanation_file, report_file,
              found.study_after.empty() ? "" : fmt::format(", {}", found.study_after),
-             found.learned ? fmt::format(", {}", learned_file) : "");
+             found.learned ? fmt::format(", {}", found.learned->effect_file) : "");
 }
 
 /// A folder that was made for results: gone again if nothing was written into it.
@@ -157,9 +156,26 @@ void remark_on_bounds(const Study& study, const explain::Explanation& found) {
 
 struct ExplanationFiles {
   fs::path folder;
-  fs::path json = folder / explanation_file, study = folder / study_file, page = folder / report_file,
-           learned = folder / learned_file;
+  fs::path json = folder / explanation_file, study = folder / study_file, page = folder / report_file;
+  /// Of the best learned law (0) and its rivals.
+  [[nodiscard]] fs::path learned(size_t law) const { return folder / explain::learned_file_name(law); }
 };
+
+/// The best law and its rivals; files of an earlier explanation go. The explanation gets the names.
+void write_learned(explain::Explanation& found, const ExplanationFiles& files) {
+  const auto write = [&](size_t law, std::string& name, const std::string& toml) {
+    name = explain::learned_file_name(law).string();
+    explain::write_learned_file(files.learned(law), toml);
+  };
+  size_t written = 0;
+  if (found.learned) {
+    write(written++, found.learned->effect_file, found.learned->toml);
+    for (explain::LearnedRival& rival : found.learned->rivals)
+      write(written++, rival.effect_file, rival.toml);
+  }
+  for (size_t law = written; law < explain::most_learned_laws; ++law)
+    explain::remove_learned_file(files.learned(law));
+}
 
 /// The explanation gets the files' names.
 void write_explanation(const Study& study, explain::Explanation& found, const ExplanationFiles& files) {
@@ -172,12 +188,7 @@ void write_explanation(const Study& study, explain::Explanation& found, const Ex
   } else {
     fs::remove(files.study, missing);  // of an earlier explanation
   }
-  if (found.learned) {
-    found.learned->effect_file = learned_file;
-    explain::write_learned_file(files.learned, found.learned->toml);
-  } else {
-    explain::remove_learned_file(files.learned);
-  }
+  write_learned(found, files);
   write_whole_file(files.json, explain::to_json(found));
   write_whole_file(files.page, report::make_report(found));
 }
@@ -202,7 +213,8 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
   require_output({files.json, inputs_of(study), explain::explanation_file_mark, arguments.force});
   require_output({files.study, inputs_of(study), study_mark, arguments.force});
   require_output({files.page, inputs_of(study), report::page_mark, arguments.force});
-  explain::require_learned_file(files.learned, inputs_of(study), arguments.force);
+  for (size_t law = 0; law < explain::most_learned_laws; ++law)
+    explain::require_learned_file(files.learned(law), inputs_of(study), arguments.force);
   const Interruption interruption;
   explain::Explanation found;
   try {
@@ -258,7 +270,9 @@ void add_explain(CommandLine& line, const ExplanationScorer& score) {
       "what was found; where the verdict is unexplained and a law at one port predicts waveforms that it was "
       "not "
       "fitted to,\n"
-      "learned.effect.toml: a suggestion that --with takes once it is read and named.\n"
+      "learned.effect.toml: a suggestion that --with takes once it is read and named, with "
+      "learned-2.effect.toml\n"
+      "and so on of laws that predict as well; it takes new runs to name it.\n"
       "A name needs an effect larger than the model's own error; smaller ones are hints. That error is "
       "learnt where the\n"
       "study names sessions in which nothing is wrong, [data] reference = [...] (diastole reference "

@@ -108,6 +108,7 @@ class Reader {
     effect_.port = root_.choice("port", {"drive", "specimen", "sensor", "clock"});
     effect_.keeps_modulus = root_.flag_or("keeps_modulus", true);
     if (root_.has("changes")) effect_.changes = root_.choice("changes", {"hose", "drive", "catheter"});
+    effect_.learnt_from = root_.texts_or("learnt_from", {});
     if (root_.has("change_points"))
       effect_.change_points = root_.choice("change_points", {"none", "one", "several"});
     for (size_t i = 0; i < quantity_count; ++i) {

@@ -53,8 +53,9 @@ struct EffectFile {
   std::string id, title, port;
   std::string change_points = "none";  ///< "one", "several"
   bool keeps_modulus = true;
-  std::string changes = {};  ///< part of the rig: "hose", "drive", "catheter"
-  std::string equations;     ///< as they stand in the file
+  std::string changes = {};                   ///< part of the rig: "hose", "drive", "catheter"
+  std::vector<std::string> learnt_from = {};  ///< run_ids of the recordings that it was learnt from
+  std::string equations;                      ///< as they stand in the file
   std::string source, looks_like, reveals;
   std::vector<std::string> looks_alike, shows_with;
 

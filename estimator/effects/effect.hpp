@@ -103,6 +103,8 @@ struct EffectDeclaration {
   std::vector<std::string_view> synergies = {};  ///< ids that only show together
   /// "hose": the part of the rig that is another one then, of whose tolerances references know nothing.
   std::string_view changes = {};
+  /// run_ids of the recordings that it was learnt from: these cannot show that it is there.
+  std::vector<std::string_view> learnt_from = {};
 
   // In recordings of the rig, if it shows there.
   std::vector<EffectParameter> parameters = {};

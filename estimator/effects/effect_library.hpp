@@ -18,8 +18,11 @@ class EffectLibrary {
   /// Adds an effect, which replaces the one of its id.
   void add(std::shared_ptr<const Effect> effect);
 
+  /// One that is known and is not looked for.
+  void set_aside(const Effect& effect) { std::erase(of_rig_, &effect); }
+
   [[nodiscard]] const std::vector<const Effect*>& all() const { return all_; }
-  /// Those that show in recordings of the rig.
+  /// Those that show in recordings of the rig, and are looked for there.
   [[nodiscard]] const std::vector<const Effect*>& of_rig() const { return of_rig_; }
   /// nullptr when no effect has that id.
   [[nodiscard]] const Effect* find(std::string_view id) const;

@@ -404,7 +404,8 @@ EffectDeclaration declaration_of(const std::shared_ptr<const Laws>& laws) {
                              .revealed_by = file.reveals,
                              .conflicts = views(file.looks_alike),
                              .synergies = views(file.shows_with),
-                             .changes = file.changes};
+                             .changes = file.changes,
+                             .learnt_from = views(file.learnt_from)};
   for (const auto& parameter : file.parameters)
     declared.parameters.push_back({parameter.name, parameter.unit, parameter.meaning, parameter.neutral,
                                    parameter.lower, parameter.upper, parameter.typical,

@@ -75,6 +75,7 @@ SessionRun session_run(RecordedRun&& run, const std::string& name) {
   read.drive.start_s = run.pressure.time_s.front();
   read.drive.end_s = run.pressure.time_s.back();
   read.drive.place.name = name;
+  read.run_id = run.run_id;
   read.drive.place.started_s = seconds_of(run.started_utc);
   read.drive.place.trigger_s = run.trigger_s;
   read.drive.place.atmosphere_kPa = attribute(run, "atmospheric_kPa", 101.325);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <string>
 #include <vector>
 
 #include "estimator/effects/effect_library.hpp"
@@ -29,7 +30,8 @@ struct SessionRun {
   std::map<Channel, std::vector<double>> pressure_kPa;  ///< NaN where a gap is declared
   std::vector<GatedVolume> volumes;
   double smoothed_mL =
-      0.0;  ///< how far drive.motion is from counts that no known motion follows; 0: one does
+      0.0;                  ///< how far drive.motion is from counts that no known motion follows; 0: one does
+  std::string run_id = {};  ///< of the recording
 
   /// Of the first sample at this time or later, to a microsecond.
   [[nodiscard]] size_t row_at(double time_s) const {

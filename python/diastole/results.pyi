@@ -702,6 +702,7 @@ class LearnedRival(Record):
     port: str
     sets: str
     variables: list[str]
+    effect_file: str
 
 @dataclass(frozen=True)
 class NextExperiment(Record):

@@ -13,6 +13,7 @@
 #include "estimator/explain/rig/findings.hpp"
 #include "estimator/explain/rig/held_out.hpp"
 #include "estimator/explain/rig/learned_term.hpp"
+#include "estimator/explain/rig/learnt_effects.hpp"
 #include "estimator/explain/rig/next_experiment.hpp"
 #include "estimator/explain/rig/part_strain.hpp"
 #include "estimator/explain/rig/reference_file.hpp"
@@ -282,8 +283,9 @@ void learn_and_propose(Explanation& out, const Study& study, const ExplainOption
 Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   const auto begun = std::chrono::steady_clock::now();
   options.report("reading the runs");
-  const rig::Session session = rig::read_session(study);
+  rig::Session session = rig::read_session(study);
   require_known_tolerances(session);
+  const std::string set_aside = set_aside_learnt(study, session);
   rig::SpecimenFamily family(study);
   family.compute_ahead();
   const auto report = [&](std::string_view what) { options.report(std::string(what)); };
@@ -314,7 +316,7 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   out.reference = reference;
   learn_and_propose(out, study, options, problem, search, verdict, error, report);
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-  out.summary += summary_of(out) + doubt_of_units(problem) + doubt_of_motion(session);
+  out.summary += summary_of(out) + set_aside + doubt_of_units(problem) + doubt_of_motion(session);
   if (verdict.tone)
     out.summary += fmt::format(
         " The cavity's pressure holds a tone near {:.1f} Hz, {:.0f} Pa RMS or more, that no cycle makes: "

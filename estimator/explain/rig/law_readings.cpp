@@ -173,9 +173,9 @@ std::string run_of(const LearnedTerm& term, std::string_view of) {
 
 }  // namespace
 
-void read_law(const PortLaw& law, const CurveEvidence& evidence, LearnedTerm& term) {
+void read_law(const PortLaw& law, const CurveEvidence& evidence, LearnedTerm& term, LawText text) {
   const std::optional<FoundForm> found = simplest_form(law, evidence, term);
-  LawText text{.title = fmt::format("learnt: {} by {}", law.sets, law.of)};
+  text.title = fmt::format("learnt: {} by {}", law.sets, law.of);
   if (!found) {
     term.readings = {fmt::format("{}: perhaps {}", run_of(term, law.of), likeness(law, ""))};
   } else {

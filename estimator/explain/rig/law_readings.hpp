@@ -20,7 +20,7 @@ struct CurveEvidence {
 /// Formulas are tried from the simplest on: none, a line, a square, saturation, a threshold, one side alone. One is taken if the data
 /// bear it: if it lies within the band at every knot, and its chi-square is no further above the curve's than one true curve in ten
 /// is (a band is wide, too, where only the specimen's stiffness takes the curve's part). Its first parameter is the curve's size, the
-/// second where it bends.
-void read_law(const PortLaw& law, const CurveEvidence& evidence, LearnedTerm& term);
+/// second where it bends. `text` holds the file's id, what it was learnt from and what looks alike.
+void read_law(const PortLaw& law, const CurveEvidence& evidence, LearnedTerm& term, LawText text = {});
 
 }  // namespace diastole::explain

@@ -10,6 +10,7 @@
 #include "estimator/explain/rig/held_out.hpp"
 #include "estimator/explain/rig/law_fit.hpp"
 #include "estimator/explain/rig/law_readings.hpp"
+#include "estimator/explain/verdict/learned_file.hpp"
 #include "estimator/inference/information.hpp"
 #include "estimator/inference/intervals.hpp"
 
@@ -23,7 +24,7 @@ using inference::Termination;
 using rig::SessionModel;
 
 constexpr double false_proposals = 0.01;  ///< of sessions in which nothing is missing, at most
-constexpr size_t laws_refined = 3;
+constexpr size_t laws_refined = most_learned_laws;
 constexpr double worth_refining = 0.5;  ///< of the best law's gain
 constexpr double least_closed = 0.5;
 constexpr double as_good = 3.0;  ///< nats: one in twenty
@@ -309,6 +310,35 @@ CurveEvidence evidence_of(const LawCandidate& law) {
   return evidence;
 }
 
+/// One of laws that predict as well as each other: its curve with the band, and its file.
+LearnedTerm read_term(const rig::SessionProblem& problem, const std::vector<const LawCandidate*>& equals,
+                      size_t which) {
+  const LawCandidate& law = *equals[which];
+  LearnedTerm term;
+  term.port = name_of(law.law->port);
+  term.sets = law.law->sets;
+  term.variables = law.law->variables;
+  term.variable_unit = law.law->of_unit;
+  term.unit = law.law->unit;
+  const std::vector<double> values = LawSearch::at_knots(law, law.fit.values);
+  const std::vector<double> sds = LawSearch::at_knots(law, law.fit.sd);
+  for (size_t k = 0; k < law.knots.size(); ++k) {
+    const double half = inference::normal_90 * sds[k];
+    term.curve.push_back({law.knots[k], values[k]});
+    term.band.push_back({values[k] - half, values[k] + half});
+    if (law.law->shape != CurveShape::passive && law.law->shape != CurveShape::resisting) continue;
+    auto& [lower, upper] = term.band.back();
+    (law.knots[k] < 0.0 ? upper : lower) = law.knots[k] < 0.0 ? std::min(upper, 0.0) : std::max(lower, 0.0);
+  }
+  LawText text{.id = learned_id(which)};
+  for (const rig::SessionRun& run : problem.session().runs)
+    if (!run.run_id.empty()) text.learnt_from.push_back(run.run_id);
+  for (size_t i = 0; i < equals.size(); ++i)
+    if (i != which) text.looks_alike.push_back(learned_id(i));
+  read_law(*law.law, evidence_of(law), term, std::move(text));
+  return term;
+}
+
 /// What is missing for the best law to be proposed; empty: nothing.
 std::string reason_rejected(const LawCandidate& law, const ChangeSize& size, const Gap& gap,
                             const ErrorKnowledge& known) {
@@ -354,30 +384,17 @@ Learning learn_term(const rig::SessionProblem& problem, const EffectSet& set, co
   const Gap gap = held_out_gap(problem, before, stated);
   if (const std::string lacks = reason_rejected(best, size, gap, known); !lacks.empty())
     return {{}, fmt::format("the best, {} by {}, {}", best.law->sets, best.law->of, lacks)};
-  LearnedTerm term;
-  term.port = name_of(best.law->port);
-  term.sets = best.law->sets;
-  term.variables = best.law->variables;
-  term.variable_unit = best.law->of_unit;
-  term.unit = best.law->unit;
-  const std::vector<double> values = search.at_knots(best, best.fit.values);
-  const std::vector<double> sds = search.at_knots(best, best.fit.sd);
-  for (size_t k = 0; k < best.knots.size(); ++k) {
-    const double half = inference::normal_90 * sds[k];
-    term.curve.push_back({best.knots[k], values[k]});
-    term.band.push_back({values[k] - half, values[k] + half});
-    if (best.law->shape != CurveShape::passive && best.law->shape != CurveShape::resisting) continue;
-    auto& [lower, upper] = term.band.back();
-    (best.knots[k] < 0.0 ? upper : lower) = best.knots[k] < 0.0 ? std::min(upper, 0.0) : std::max(lower, 0.0);
+  std::vector<const LawCandidate*> equals;
+  for (const LawCandidate& law : laws)
+    if (&law == &best || law.gain > best.gain - as_good) equals.push_back(&law);
+  LearnedTerm term = read_term(problem, equals, 0);
+  for (size_t i = 1; i < equals.size(); ++i) {
+    LearnedTerm other = read_term(problem, equals, i);
+    term.rivals.push_back({other.port, other.sets, other.variables, {}, std::move(other.toml)});
   }
   term.gap = gap;
   term.held_out_gain = log_mean(best.gains);
   term.shifts = parameter_shifts(problem, before, with);
-  for (const LawCandidate& other : laws)
-    if (&other != &best && other.gain > best.gain - as_good)
-      term.rivals.push_back(
-          {std::string(name_of(other.law->port)), std::string(other.law->sets), other.law->variables});
-  read_law(*best.law, evidence_of(best), term);
   return {std::move(term), {}};
 }
 

@@ -24,14 +24,23 @@ std::string parameter_text(const LawParameter& parameter) {
       parameter.upper, parameter.typical, toml_text(parameter.meaning));
 }
 
+std::string list_text(std::string_view key, const std::vector<std::string>& texts) {
+  if (texts.empty()) return {};
+  std::string list;
+  for (const std::string& text : texts)
+    list += (list.empty() ? "" : ", ") + toml_text(text);
+  return fmt::format("{} = [{}]\n", key, list);
+}
+
 std::string file_text(const PortLaw& law, const std::string& inner, const std::string& curve,
                       const LawText& text) {
   return fmt::format(
-      "format = \"diastole-effect\"\nversion = 1\nid = {}\ntitle = {}\nport = {}\n\n{}[equations]\n"
-      "{} = {}\n\n[text]\nsource = {}\nlooks_like = {}\nreveals = {}\n",
-      toml_text(text.id), toml_text(text.title), toml_text(name_of(law.port)), inner, law.sets,
+      "format = \"diastole-effect\"\nversion = 1\nid = {}\ntitle = {}\nport = {}\n{}\n{}"
+      "[equations]\n{} = {}\n\n[text]\nsource = {}\nlooks_like = {}\nreveals = {}\n{}",
+      toml_text(text.id), toml_text(text.title), toml_text(name_of(law.port)),
+      list_text("learnt_from", text.learnt_from), inner, law.sets,
       toml_text(fmt::format("{}{}{}", law.before, curve, law.behind)), toml_text(text.source),
-      toml_text(text.looks_like), toml_text(text.reveals));
+      toml_text(text.looks_like), toml_text(text.reveals), list_text("looks_alike", text.looks_alike));
 }
 
 }  // namespace

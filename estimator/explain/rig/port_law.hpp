@@ -59,6 +59,7 @@ struct LawText {
   std::string id = "learned";
   std::string title = "a law that was learnt";
   std::string source = "learnt from recordings", looks_like = "", reveals = "";
+  std::vector<std::string> learnt_from = {}, looks_alike = {};  ///< run_ids; ids of other effects
 };
 /// A file with the tabulated curve times a size that is 0 or 1: the natural cubic spline, straight beyond its ends.
 std::string tabulated_law(const PortLaw& law, std::span<const double> at, std::span<const double> values,

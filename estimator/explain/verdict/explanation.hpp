@@ -178,6 +178,8 @@ struct LearnedRival {
   std::string port;
   std::string sets;
   std::vector<std::string> variables;
+  std::string effect_file;  ///< beside the JSON
+  std::string toml;         ///< the file's text; not in the JSON
 };
 
 /// A law that the library lacks, learnt at one port: a suggestion for a person to read and to name, no verdict.

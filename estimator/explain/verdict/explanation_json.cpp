@@ -42,7 +42,7 @@ DIASTOLE_MEMBERS(Candidate, ids, chi_square_drop, refitted, parameters, held_out
 
 DIASTOLE_MEMBERS(ParameterShift, name, before, before_error, after, after_error)
 
-DIASTOLE_MEMBERS(LearnedRival, port, sets, variables)
+DIASTOLE_MEMBERS(LearnedRival, port, sets, variables, effect_file)
 DIASTOLE_MEMBERS(LearnedTerm, port, sets, variables, variable_unit, unit, curve, band, closed_form, gap,
                  held_out_gain, readings, shifts, rivals, effect_file, toml)
 

@@ -25,6 +25,10 @@ bool is_as_written(const fs::path& path) {
 
 }  // namespace
 
+std::string learned_id(size_t law) { return law == 0 ? "learned" : fmt::format("learned-{}", law + 1); }
+
+fs::path learned_file_name(size_t law) { return learned_id(law) + ".effect.toml"; }
+
 void require_learned_file(const fs::path& path, const std::vector<fs::path>& inputs, bool force) {
   require_output({path, inputs, mark, force});
   if (force || !fs::exists(path) || fs::is_empty(path) || is_as_written(path)) return;

@@ -91,15 +91,23 @@ std::string verdict_sentence(const Explanation& found) {
 
 }  // namespace
 
+std::string place_of(const LearnedTerm& term) {
+  const auto words = [](const auto& law) {
+    return fmt::format("at the port {}, {} by {}", law.port, law.sets, fmt::join(law.variables, " and "));
+  };
+  std::string place = words(term);
+  for (const LearnedRival& rival : term.rivals)
+    place += ", or as well " + words(rival);
+  return place;
+}
+
 std::string summary_of(const Explanation& found) {
   std::string summary = verdict_sentence(found);
   if (found.learned)
     summary += fmt::format(
-        " A law that was learnt at the port {}, {} by {}, closes {:.0f} % of the gap on waveforms that were "
-        "not "
-        "fitted: a suggestion, to be read and named.",
-        found.learned->port, found.learned->sets, fmt::join(found.learned->variables, " and "),
-        100.0 * found.learned->gap.closed);
+        " A law that was learnt {} closes {:.0f} % of the gap on waveforms that were not fitted: a "
+        "suggestion, to be read and named.",
+        place_of(*found.learned), 100.0 * found.learned->gap.closed);
   return summary;
 }
 

@@ -59,6 +59,7 @@ TEST(ExplanationJson, KeepsALearnedTerm) {
   term.variables = {"q_hose"};
   term.curve = {{0.0, 0.0}, {50.0, 3.0}};
   term.band = {{0.0, 0.0}, {2.5, 3.5}};
+  term.rivals = {{"specimen", "p", {"V"}, "learned-2.effect.toml", "id = \"learned-2\""}};
   const auto json = nlohmann::json::parse(to_json(explanation));
   for (const char* key : {"port", "variables", "curve", "band", "gap", "readings", "effect_file"})
     EXPECT_TRUE(json.at("learned").contains(key)) << key;
@@ -66,6 +67,8 @@ TEST(ExplanationJson, KeepsALearnedTerm) {
   const Explanation again = explanation_from_json(to_json(explanation), "e.json");
   ASSERT_TRUE(again.learned.has_value());
   EXPECT_EQ(again.learned->curve, explanation.learned->curve);
+  ASSERT_EQ(again.learned->rivals.size(), 1U);
+  EXPECT_EQ(again.learned->rivals[0].effect_file, "learned-2.effect.toml");
 }
 
 TEST(ExplanationJson, TakesADocumentOfTheContractsKeysOnly) {

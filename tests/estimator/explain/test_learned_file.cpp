@@ -45,6 +45,12 @@ TEST_F(LearnedFile, IsNotRemovedWhereAnotherFileHasItsName) {
   EXPECT_TRUE(fs::exists(path_));
 }
 
+TEST_F(LearnedFile, HasTheNameOfItsEffect) {
+  EXPECT_EQ(learned_id(0), "learned");
+  EXPECT_EQ(learned_file_name(0), "learned.effect.toml");
+  EXPECT_EQ(learned_file_name(1), "learned-2.effect.toml");
+}
+
 TEST_F(LearnedFile, IsNeverAnInput) { EXPECT_THROW(require_learned_file(path_, {path_}, true), InputError); }
 
 }  // namespace

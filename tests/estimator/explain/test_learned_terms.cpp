@@ -41,7 +41,9 @@ class LearnedTerms : public testing::Test {
       options.terms = {{effect.get(), {}}};
       options.values = {1.0};
     }
-    const rig::Session session = rig::simulated_session(family_, options);
+    rig::Session session = rig::simulated_session(family_, options);
+    for (rig::SessionRun& run : session.runs)
+      run.run_id = "id of " + run.drive.place.name;
     const rig::SessionProblem problem(session, family_, 2);
     const rig::LinearisedModel base = rig::declared_rig(problem);
     const EffectSet plain =
@@ -126,6 +128,8 @@ TEST_F(LearnedTerms, FindAContactAndWriteAFileThatSaysSo) {
   EXPECT_GT(term->gap.closed, 0.7);
   const auto effect = effect_of_text(term->toml);
   EXPECT_EQ(effect->text().port, Port::specimen);
+  EXPECT_THAT(effect->text().learnt_from, ElementsAre("id of baseline", "id of sweep", "id of hold"));
+  EXPECT_EQ(effect->text().conflicts.size(), term->rivals.size());
   const EffectTrial trial(*effect);
   for (const EffectCheck& check : {trial.declared(), trial.neutral(), trial.shows(), trial.bounded()})
     EXPECT_TRUE(check.passed) << check.name << ": " << check.detail;
@@ -156,6 +160,17 @@ TEST_F(LawReadings, GiveAFormulaWithItsValues) {
   LearnedTerm term = known_to(0.01, [](double q) { return 4.0 * std::tanh(q / 25.0); });
   read_law(law_, evidence(term, 1e4 * Eigen::MatrixXd::Identity(11, 11)), term);
   EXPECT_EQ(term.closed_form, "a * tanh(q_hose / b), a = 4 [kPa], b = 25 [mL/s]");
+}
+
+TEST_F(LawReadings, GiveEveryLawItsFileAndWhatLooksLikeIt) {
+  LearnedTerm term = known_to(0.01, [](double q) { return 0.04 * q; });
+  read_law(law_, evidence(term, 1e4 * Eigen::MatrixXd::Identity(11, 11)), term,
+           {.id = "learned-2", .learnt_from = {"run one", "run \"two\""}, .looks_alike = {"learned"}});
+  const auto effect = effect_of_text(term.toml);
+  const EffectDeclaration& text = effect->text();
+  EXPECT_EQ(text.id, "learned-2");
+  EXPECT_THAT(text.learnt_from, ElementsAre("run one", "run \"two\""));
+  EXPECT_THAT(text.conflicts, ElementsAre("learned"));
 }
 
 TEST_F(LawReadings, ABandThatIsWideAlongOneCurveAdmitsNoOther) {

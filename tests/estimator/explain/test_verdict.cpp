@@ -25,5 +25,18 @@ TEST(Verdicts, ASearchThatRestsOnABoundHasSettled) {
     EXPECT_FALSE(is_settled({{{"stroke-gain"}, termination}}));
 }
 
+TEST(Verdicts, ALearnedLawIsNamedWithThoseThatPredictAsWell) {
+  Explanation found;
+  found.verdict = Verdict::unexplained;
+  LearnedTerm& term = found.learned.emplace();
+  term.port = "drive";
+  term.sets = "V_piston";
+  term.variables = {"V_command"};
+  term.rivals = {{"specimen", "p", {"V"}, {}, {}}};
+  EXPECT_THAT(summary_of(found),
+              HasSubstr("learnt at the port drive, V_piston by V_command, or as well at the "
+                        "port specimen, p by V closes"));
+}
+
 }  // namespace
 }  // namespace diastole::explain
