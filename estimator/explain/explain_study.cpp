@@ -38,6 +38,20 @@ Ids shared(const Ids& ids) {
   return both;
 }
 
+/// An effect's values in images beside those in runs. Most have names of their own; of a quantity that both estimate the one that is
+/// better known stands.
+void add_estimates(std::vector<FoundParameter>& values, std::vector<FoundParameter> more) {
+  const auto width = [](const FoundParameter& value) { return value.ci90[1] - value.ci90[0]; };
+  for (FoundParameter& other : more) {
+    const auto same = std::ranges::find(values, other.name, &FoundParameter::name);
+    if (same == values.end()) {
+      values.push_back(std::move(other));
+    } else if (width(other) < width(*same)) {
+      *same = std::move(other);
+    }
+  }
+}
+
 /// Those of the sets that are left open whose effects in both data are these, and their searches; nothing at all is not one of them,
 /// which the other data exclude. If none but the best is left it is named, and what was said and proposed of the others goes.
 void keep_agreeing(Explanation& explanation, const Ids& agreed) {
@@ -99,7 +113,7 @@ Explanation merged(Explanation rig, Explanation field) {
     if (same == both.effects.end()) {
       both.effects.push_back(std::move(effect));
     } else {
-      append(same->parameters, std::move(effect.parameters));
+      add_estimates(same->parameters, std::move(effect.parameters));
     }
   }
   append(both.ambiguous_with, std::move(field.ambiguous_with));

@@ -18,7 +18,7 @@ Explanation explain_study(const Study& study, const ExplainOptions& options);
 /// Unchanged where the images are unexplained or ambiguous.
 Study with_imaged_modulus(Study study, const Explanation& field);
 
-/// Effects of both; named only if both agree that nothing else is open.
+/// Effects of both, a value that both estimate as the better known one; named only if both agree that nothing else is open.
 Explanation merged(Explanation rig, Explanation field);
 
 }  // namespace diastole::explain

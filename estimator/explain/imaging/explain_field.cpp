@@ -335,9 +335,12 @@ class Explainer {
     out.name = parameter.name;
     out.unit = parameter.unit;
     out.value = choice.values[value];
-    out.ci90 = {out.value, out.value};
     const auto place = std::ranges::find(choice.free, value);
-    if (place == choice.free.end()) return out;
+    if (place == choice.free.end()) {  // it did not pay to free it: it may be anything
+      out.ci90 = {parameter.lower, parameter.upper};
+      out.standard_error = (parameter.upper - parameter.lower) / (2.0 * inference::normal_90);
+      return out;
+    }
     const Index unknown = static_cast<Index>(fit.law.size()) + (place - choice.free.begin());
     const inference::Parameter scale = searched(parameter);
     const double coordinate = scale.coordinate(out.value);

@@ -70,6 +70,21 @@ TEST(RunsAndImages, AnEffectThatShowsInBothIsJudgedByBoth) {
   EXPECT_EQ(both.effects.size(), 1U);
 }
 
+/// Runs say the fraction by which a radius is larger, images the radius; the stiffening of both is one number.
+TEST(RunsAndImages, AQuantityOfBothHasOneValue) {
+  Explanation runs = of(Verdict::named, {"strain-stiffening", "radius-error"});
+  runs.effects[0].parameters = {{"beta", 1.0, 0.5, {0.2, 1.8}}};
+  runs.effects[1].parameters = {{"fraction", 0.04, 0.01, {0.02, 0.06}}};
+  Explanation images = of(Verdict::named, {"radius-error", "strain-stiffening"});
+  images.effects[0].parameters = {{"true_inner_radius_mm", 23.4, 0.1, {23.2, 23.6}}};
+  images.effects[1].parameters = {{"beta", 1.2, 0.1, {1.0, 1.4}}};
+  const Explanation both = merged(std::move(runs), std::move(images));
+  ASSERT_EQ(both.effects.size(), 2U);
+  ASSERT_EQ(both.effects[0].parameters.size(), 1U);
+  EXPECT_EQ(both.effects[0].parameters[0].value, 1.2);
+  EXPECT_EQ(both.effects[1].parameters.size(), 2U);
+}
+
 TEST(RunsAndImages, WhatWasSaidOfSetsThatTheOtherDataExcludeGoesWithThem) {
   Explanation runs = of(Verdict::ambiguous, {"radius-error"}, {{}});
   runs.confidence = 0.8;

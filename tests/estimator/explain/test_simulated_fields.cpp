@@ -93,8 +93,11 @@ TEST_P(SimulatedImages, AreExplained) {
   const Explanation explanation = explain_field(simulated_tags(GetParam().tags), GetParam().name);
   EXPECT_EQ(name_of(explanation.verdict), name_of(GetParam().verdict)) << explanation.summary;
   std::vector<std::string> ids;
-  for (const FoundEffect& effect : explanation.effects)
+  for (const FoundEffect& effect : explanation.effects) {
     ids.push_back(effect.id);
+    for (const FoundParameter& parameter : effect.parameters)  // those that were not freed, too
+      EXPECT_LT(parameter.ci90[0], parameter.ci90[1]) << effect.id << " " << parameter.name;
+  }
   const bool inside =
       ids == GetParam().ids || std::ranges::count(explanation.ambiguous_with, GetParam().ids) > 0;
   EXPECT_TRUE(inside) << explanation.summary;
