@@ -33,7 +33,8 @@ class PumpEnd {
   [[nodiscard]] double load_kPa(double yielded_mL, double yielding_mL_per_s, double time_s) const;
   /// Whether something leaks that is not in proportion to the pressure.
   [[nodiscard]] bool leaks() const { return !leaks_.empty(); }
-  /// Only then: what a load at the end of a step, by which y has come to this, lacks to be the one of where it brings y.
+  /// Only then. With `load_kPa` at a step's end y and y' have come to this; with so much more, which moves them on by `by_load`, the
+  /// load is that of where they come to.
   [[nodiscard]] double missing_load_kPa(double yielded_mL, double yielding_mL_per_s, double load_kPa,
                                         const YieldByLoad& by_load, double time_s) const;
   /// Goes on by a step that began with this pressure in the cylinder: what leaks follows it.

@@ -105,7 +105,7 @@ std::string summary_of(const Explanation& found) {
   std::string summary = verdict_sentence(found);
   if (found.learned)
     summary += fmt::format(
-        " A law that was learnt {} closes {:.0f} % of the gap on waveforms that were not fitted: a "
+        " A law that was learnt {}, closes {:.0f} % of the gap on waveforms that were not fitted: a "
         "suggestion, to be read and named.",
         place_of(*found.learned), 100.0 * found.learned->gap.closed);
   return summary;

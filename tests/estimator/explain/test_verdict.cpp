@@ -35,7 +35,7 @@ TEST(Verdicts, ALearnedLawIsNamedWithThoseThatPredictAsWell) {
   term.rivals = {{"specimen", "p", {"V"}, {}, {}}};
   EXPECT_THAT(summary_of(found),
               HasSubstr("learnt at the port drive, V_piston by V_command, or as well at the "
-                        "port specimen, p by V closes"));
+                        "port specimen, p by V, closes"));
 }
 
 }  // namespace
