@@ -25,7 +25,7 @@ std::vector<double> EstimatedParameters::se_percent(const Eigen::MatrixXd& covar
   std::vector<double> result;
   for (const ParameterRun& run : runs) {
     const double se = run.se_of_mean(covariance);
-    const bool relative = run.parameter.lower > 0;  // its coordinate is the logarithm
+    const bool relative = values[run.first].scale == inference::Scale::logarithmic;
     result.push_back(100 * (relative ? se : se / std::abs(run.parameter.start)));
   }
   return result;
@@ -49,6 +49,7 @@ EstimatedParameters estimated_parameters(const Study& study, const ElasticModel&
     const std::vector<ParameterGroup> groups = parameter.vary == Variation::whole
                                                    ? std::vector{whole_parameter(index)}
                                                    : each_element(index, model.mesh().element_count());
+    const std::string unit = parameter.name.ends_with("_kPa") ? "kPa" : "";
     const size_t first = estimated.values.size();
     estimated.runs.push_back({parameter, first, groups.size(), of_law.is_modulus()});
     const Smoothness& smoothness = parameter.smoothness;
@@ -61,7 +62,7 @@ EstimatedParameters estimated_parameters(const Study& study, const ElasticModel&
       const std::string name = groups.size() == 1
                                    ? parameter.name
                                    : fmt::format("{}[{}]", parameter.name, estimated.values.size() - first);
-      estimated.values.push_back({parameter.start, parameter.lower, parameter.upper, name});
+      estimated.values.emplace_back(parameter.start, parameter.lower, parameter.upper, name, unit);
     }
   }
   return estimated;

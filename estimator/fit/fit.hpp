@@ -1,7 +1,7 @@
 #pragma once
 // The fit: material values that make the model's motion agree best with the measured one.
 //
-//   FitOutcome fit = fit_motion(model, {{.start = 6, .lower = 1, .upper = 15}}, measurement, {});
+//   FitOutcome fit = fit_motion(model, {{6, 1, 15, "C1_kPa", "kPa"}}, measurement, {});
 //   fit.values[0].value, fit.values[0].se, fit.values[0].ci95
 //
 // The estimate is the maximum of the likelihood of tag points, 3-D points and frame pressures under their

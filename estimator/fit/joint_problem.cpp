@@ -19,29 +19,27 @@ JointProblem::JointProblem(MotionModel& model, const std::vector<EstimatedParame
     unknowns.push_back(std::move(parameter));
     return static_cast<Eigen::Index>(start.size() - 1);
   };
-  for (const EstimatedParameter& value : values) {
-    const auto scale = value.lower > 0 ? inference::Scale::logarithmic : inference::Scale::linear;
-    add_unknown({value.name, {}, value.lower, value.upper, scale}, value.start);
-  }
+  for (const EstimatedParameter& value : values)
+    add_unknown(value, value.start);
   for (const int frame : loaded_frames(measurement)) {
     const Frame& load = measurement.frames[static_cast<size_t>(frame)];
     std::optional<Eigen::Index> pressure_unknown;
     if (load.sigma_kPa > 0)
-      pressure_unknown = add_unknown({fmt::format("pressure_kPa[{}]", frame)}, load.pressure_kPa);
+      pressure_unknown = add_unknown({fmt::format("pressure_kPa[{}]", frame), "kPa"}, load.pressure_kPa);
     frames_.push_back({frame, load, MotionResiduals(measurement, {frame}, locator), pressure_unknown, {}});
   }
   if (imaged_ && imaged_->sigma_kPa > 0)
-    imaged_unknown_ = add_unknown({"imaged_at_kPa"}, imaged_->pressure_kPa);
+    imaged_unknown_ = add_unknown({"imaged_at_kPa", "kPa"}, imaged_->pressure_kPa);
   if (!measurement.frames.empty() && !imaged_) {
     const Frame& rest = measurement.frames.front();
     if (rest.pressure_kPa != 0 && rest.sigma_kPa > 0) rest_reading_ = rest;
   }
   if (offset_sigma_kPa) {
     offset_sigma_kPa_ = *offset_sigma_kPa;
-    offset_unknown_ = add_unknown({"pressure_offset_kPa"}, 0.0);
+    offset_unknown_ = add_unknown({"pressure_offset_kPa", "kPa"}, 0.0);
   }
   for (Eigen::Index i = 0; i < planes_.unknowns(); ++i)
-    add_unknown({TagPlanes::name(i)}, 0.0);
+    add_unknown({TagPlanes::name(i), "mm"}, 0.0);
   space_ = inference::ParameterSpace(std::move(unknowns));
   start_ = Eigen::Map<const Eigen::VectorXd>(start.data(), static_cast<Eigen::Index>(start.size()));
 }

@@ -30,6 +30,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "estimator/fit/motion_model.hpp"
@@ -43,12 +44,16 @@
 
 namespace diastole {
 
-/// A value to be estimated, in the model's order. Invariant: lower <= start <= upper, lower < upper.
-struct EstimatedParameter {
+/// A value to be estimated, in the model's order; one that is positive within its bounds is searched by its logarithm.
+/// Invariant: lower <= start <= upper, lower < upper.
+struct EstimatedParameter : inference::Parameter {
+  EstimatedParameter(double start_value, double lowest, double highest, std::string its_name = {},
+                     std::string its_unit = {})
+      : Parameter{std::move(its_name), std::move(its_unit), lowest, highest,
+                  lowest > 0 ? inference::Scale::logarithmic : inference::Scale::linear},
+        start(start_value) {}
+
   double start;
-  double lower;
-  double upper;
-  std::string name = {};
 };
 
 class JointProblem : public inference::LeastSquaresProblem {

@@ -130,12 +130,7 @@ size_t SpecimenProblem::highest_slot() const {
 }
 
 double SpecimenProblem::law_error(const FieldFit& fit, size_t value) const {
-  const EstimatedParameter& law = estimated_.values[value];
-  const inference::Parameter parameter{
-      .name = law.name,
-      .lower = law.lower,
-      .upper = law.upper,
-      .scale = law.lower > 0.0 ? inference::Scale::logarithmic : inference::Scale::linear};
+  const EstimatedParameter& parameter = estimated_.values[value];
   const auto place = static_cast<Index>(value);
   return inference::standard_error(parameter, parameter.coordinate(fit.law[value]),
                                    std::sqrt(fit.covariance(place, place)));
@@ -170,8 +165,8 @@ FieldFit SpecimenProblem::fit(const FieldChoice& choice, const FieldFit& from) {
     unknowns[i].start = std::clamp(from.law[i], unknowns[i].lower, unknowns[i].upper);
   for (const size_t value : choice.free) {
     const EffectParameter& parameter = choice.parameter(value);
-    unknowns.push_back({std::clamp(choice.values[value], parameter.lower, parameter.upper), parameter.lower,
-                        parameter.upper, std::string(parameter.name)});
+    unknowns.emplace_back(std::clamp(choice.values[value], parameter.lower, parameter.upper), parameter.lower,
+                          parameter.upper, std::string(parameter.name), std::string(parameter.unit));
   }
   auto motion = std::make_unique<ChangedMotion>(motion_of(choice));
   JointProblem problem(*motion, unknowns, field_.measurement, field_.locator);

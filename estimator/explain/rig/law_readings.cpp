@@ -199,13 +199,13 @@ void read_law(const PortLaw& law, const CurveEvidence& evidence, LearnedTerm& te
   formula = replaced(formula, "X", with_unit(X, law.of_unit));
   formula = replaced(formula, "zero", with_unit(0.0, law.of_unit));
   constexpr double widest = 5.0;  // times what was found
-  std::vector<LawParameter> parameters{{"a", std::string(law.unit), 0.0, std::min(0.0, widest * found->a),
-                                        std::max(0.0, widest * found->a), found->a, "size of the curve"}};
+  std::vector<CurveParameter> parameters{{"a", std::string(law.unit), 0.0, std::min(0.0, widest * found->a),
+                                          std::max(0.0, widest * found->a), found->a, "size of the curve"}};
   if (found->form->bends)
     parameters.push_back(
         {"b", std::string(law.of_unit), found->b * X, 0.02 * X, X, found->b * X, "where it bends"});
   term.closed_form = formula;
-  for (const LawParameter& parameter : parameters)
+  for (const CurveParameter& parameter : parameters)
     term.closed_form +=
         fmt::format(", {} = {}", parameter.name, with_unit(parameter.typical, parameter.unit));
   term.toml = formula_law(law, law.behind.empty() ? formula : "(" + formula + ")", parameters, text);

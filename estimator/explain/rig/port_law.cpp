@@ -16,7 +16,7 @@ namespace {
 
 using enum CurveShape;
 
-std::string parameter_text(const LawParameter& parameter) {
+std::string parameter_text(const CurveParameter& parameter) {
   return fmt::format(
       "[[parameter]]\nname = {}\nunit = {}\nneutral = {:g}\nbounds = [{:g}, {:g}]\ntypical = {:g}\n"
       "meaning = {}\n\n",
@@ -142,7 +142,7 @@ double curve_scale(const PortLaw& law, const rig::SessionProblem& problem, const
 
 std::string tabulated_law(const PortLaw& law, std::span<const double> at, std::span<const double> values,
                           const LawText& text) {
-  const LawParameter size{"size", "1", 0.0, 0.0, 3.0, 1.0, "part of the curve"};
+  const CurveParameter size{"size", "1", 0.0, 0.0, 3.0, 1.0, "part of the curve"};
   const std::string curve =
       fmt::format("[[curve]]\nname = \"law\"\nof = {}\nunit = {}\nat = [{}]\nvalues = [{}]\n\n",
                   toml_text(law.of_unit), toml_text(law.unit), fmt::join(at, ", "), fmt::join(values, ", "));
@@ -150,9 +150,9 @@ std::string tabulated_law(const PortLaw& law, std::span<const double> at, std::s
 }
 
 std::string formula_law(const PortLaw& law, const std::string& curve,
-                        std::span<const LawParameter> parameters, const LawText& text) {
+                        std::span<const CurveParameter> parameters, const LawText& text) {
   std::string inner;
-  for (const LawParameter& parameter : parameters)
+  for (const CurveParameter& parameter : parameters)
     inner += parameter_text(parameter);
   return file_text(law, inner, curve, text);
 }

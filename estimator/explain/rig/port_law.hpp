@@ -64,15 +64,15 @@ struct LawText {
 /// A file with the tabulated curve times a size that is 0 or 1: the natural cubic spline, straight beyond its ends.
 std::string tabulated_law(const PortLaw& law, std::span<const double> at, std::span<const double> values,
                           const LawText& text = {});
-/// A parameter of a file.
-struct LawParameter {
+/// A parameter of a file whose curve is a formula.
+struct CurveParameter {
   std::string name, unit;
   double neutral = 0.0, lower = 0.0, upper = 0.0, typical = 0.0;
   std::string meaning;
 };
 /// A file whose curve is a formula of its parameters.
 std::string formula_law(const PortLaw& law, const std::string& curve,
-                        std::span<const LawParameter> parameters, const LawText& text);
+                        std::span<const CurveParameter> parameters, const LawText& text);
 std::shared_ptr<const Effect> effect_of_text(const std::string& text);
 
 }  // namespace diastole::explain

@@ -22,6 +22,15 @@ Measurement measured(const SyntheticOptions& options) {
   return synthetic(truth, options);
 }
 
+TEST(JointProblem, UnknownsHaveUnitsAndPositiveOnesAreSearchedByTheirLogarithm) {
+  ElasticMotion motion(coarse_gel(8), {whole_parameter(0)});
+  const JointProblem problem(motion, {{7.0, 1.0, 15.0, "C1_kPa", "kPa"}}, measured({.tags_a_frame = 40}), {});
+  EXPECT_EQ(problem.space()[0].scale, inference::Scale::logarithmic);
+  for (Eigen::Index i = 0; i < problem.space().size(); ++i)
+    EXPECT_EQ(problem.space()[i].unit, "kPa") << problem.space()[i].name;
+  EXPECT_EQ(EstimatedParameter(0.0, -1.0, 1.0).scale, inference::Scale::linear);
+}
+
 TEST(JointProblem, TheJacobianIsTheResidualsDerivative) {
   Measurement measurement = measured({.tags_a_frame = 40, .points_a_frame = 10});
   measurement.planes_as_seen = true;
