@@ -92,6 +92,7 @@ Study with_imaged_modulus(Study study, const Explanation& field) {
   StudyParameter& modulus = study.law.parameters.front();
   const auto seen = std::ranges::find(field.law, modulus.name, &ParameterShift::name);
   if (seen == field.law.end() || !is_modulus(study, modulus) || !(seen->after > 0.0)) return study;
+  if (!(seen->after_error > 0.0)) return study;  // it rests on its bound
   // A uniform distribution over the bounds has the standard deviation that is known.
   const double reach = std::exp(std::sqrt(3.0) * std::hypot(seen->after_error / seen->after, beside_the_fit));
   if (!(reach * reach < modulus.upper / modulus.lower)) return study;

@@ -29,7 +29,7 @@ void LinearModel::move_to(const Eigen::VectorXd& to, const Eigen::VectorXd& resi
   residuals = residuals_there;
 }
 
-void move_to_minimum(LinearModel& model, const ParameterSpace& space, std::vector<bool>& is_free) {
+void move_to_minimum(LinearModel& model, const ParameterSpace& space, std::vector<bool> is_free) {
   for (bool is_stopped = true; is_stopped;) {
     std::vector<Eigen::Index> free;
     for (Eigen::Index i = 0; i < space.size(); ++i)

@@ -26,8 +26,8 @@ struct LinearModel {
 };
 
 /// Moves to the least chi-square that the linear model has within the bounds. Unknowns that are not free stay; those that a bound stops are
-/// held on it, and are not free afterwards. Precondition: q is within the bounds, and `is_free` has an entry for each unknown.
-void move_to_minimum(LinearModel& model, const ParameterSpace& space, std::vector<bool>& is_free);
+/// held on it. Precondition: q is within the bounds, and `is_free` has an entry for each unknown.
+void move_to_minimum(LinearModel& model, const ParameterSpace& space, std::vector<bool> is_free);
 
 /// The unknowns that rest on a bound while chi-square falls only beyond it.
 std::vector<bool> pressed_on_bounds(const LinearModel& model, const ParameterSpace& space);

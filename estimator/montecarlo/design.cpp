@@ -10,6 +10,7 @@
 #include "estimator/fit/study_fit.hpp"
 #include "estimator/fit/study_motion.hpp"
 #include "estimator/fit/usable_points.hpp"
+#include "estimator/inference/information.hpp"
 #include "estimator/model/affected_model.hpp"
 #include "estimator/model/study_model.hpp"
 #include "estimator/montecarlo/synthetic_data.hpp"
@@ -98,9 +99,7 @@ class Explorer {
 
   /// Relative standard errors of the study's parameters, in %.
   [[nodiscard]] std::vector<double> se_percent(const Eigen::MatrixXd& information) const {
-    const Eigen::MatrixXd covariance =
-        information.ldlt().solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
-    return estimated_.se_percent(covariance);
+    return estimated_.se_percent(inference::covariance_of_information(information).matrix);
   }
 
  private:

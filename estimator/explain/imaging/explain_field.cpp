@@ -54,7 +54,11 @@ class Explainer {
     fit_base();
     fit_effects();
     judge();
-    out_.law = specimen_.shifts(chosen_ != nullptr ? chosen_->fit : specimen_.base());
+    const FieldFit& explaining = chosen_ != nullptr ? chosen_->fit : specimen_.base();
+    out_.law = specimen_.shifts(explaining);
+    for (const std::string& combination : explaining.undetermined)
+      out_.summary +=
+          fmt::format(" Nothing in these data changes along {}: they do not determine it.", combination);
     if (widened_ > 1.0)
       out_.summary += fmt::format(
           " Neighbouring tags are off alike: all is judged with their sigmas {:.2f} times as large.",

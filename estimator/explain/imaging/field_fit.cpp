@@ -73,6 +73,15 @@ VectorXd FieldFit::all_residuals() const {
   return all;
 }
 
+void estimate_covariance(FieldFit& fit, const inference::ParameterSpace& space,
+                         const std::vector<bool>& is_free) {
+  const inference::Covariance found = inference::estimate_covariance(fit.jacobian, is_free);
+  fit.covariance = found.matrix;
+  fit.undetermined.clear();
+  for (const VectorXd& combination : found.undetermined)
+    fit.undetermined.push_back(inference::in_words(combination, space));
+}
+
 /// The search for one choice.
 class FieldProblem::Search final : public inference::LeastSquaresProblem {
  public:
@@ -278,8 +287,8 @@ FieldFit FieldProblem::fit(FieldChoice choice, const Start& start, std::optional
   result.chi_square = all.squaredNorm();
   result.residuals = all.head(rows_.size());
   result.priors = all.tail(all.size() - rows_.size());
-  result.covariance = inference::estimate_covariance(found.jacobian).matrix;
   result.jacobian = std::move(found.jacobian);
+  estimate_covariance(result, search.space(), search.space().free_unknowns(found.q));
   return result;
 }
 

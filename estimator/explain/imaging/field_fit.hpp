@@ -8,6 +8,7 @@
 
 #include <Eigen/Dense>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "estimator/effects/effect.hpp"
@@ -46,10 +47,12 @@ struct FieldFit {
   /// Nothing but a settled fit may be named; no_solution: the start has no equilibrium, and chi_square is infinite.
   inference::Termination termination = inference::Termination::no_solution;
   /// Order of unknowns: the law's (positive ones by their logarithm), free parameters in their search coordinates, pressures, others.
+  /// Nothing of unknowns on a bound, infinite for those that are not determined.
   Eigen::MatrixXd covariance;
-  Eigen::VectorXd residuals;  ///< of the rows, in sigmas
-  Eigen::MatrixXd jacobian;   ///< of the rows, then of the priors
-  Eigen::VectorXd priors;     ///< the remaining residuals
+  std::vector<std::string> undetermined;  ///< combinations of unknowns that move no residual, in words
+  Eigen::VectorXd residuals;              ///< of the rows, in sigmas
+  Eigen::MatrixXd jacobian;               ///< of the rows, then of the priors
+  Eigen::VectorXd priors;                 ///< the remaining residuals
   /// Intervals of choice.values where the covariance does not give them; empty: it does.
   std::vector<std::array<double, 2>> ci90;
 
@@ -58,6 +61,10 @@ struct FieldFit {
   /// Rows, then priors.
   [[nodiscard]] Eigen::VectorXd all_residuals() const;
 };
+
+/// The fit's covariance by its Jacobian, and what that does not determine. `space`: of the Jacobian's columns.
+void estimate_covariance(FieldFit& fit, const inference::ParameterSpace& space,
+                         const std::vector<bool>& is_free);
 
 class FieldProblem {
  public:

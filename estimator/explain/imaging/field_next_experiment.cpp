@@ -300,10 +300,9 @@ NextExperiment sharpening_images(const FieldCase& field, const MotionResiduals& 
   unsigned best = 1;
   double best_sigma = 0.0;
   for (unsigned i = 0; i < changes.size(); ++i) {
-    const Eigen::MatrixXd information = outlook.of(imaging_of(1U << i)).information();
-    const Eigen::VectorXd along =
-        information.ldlt().solve(Eigen::VectorXd::Unit(information.cols(), unknown));
-    const double sigma = distance(along[unknown]);
+    const Eigen::MatrixXd covariance =
+        inference::covariance_of_information(outlook.of(imaging_of(1U << i)).information()).matrix;
+    const double sigma = distance(covariance(unknown, unknown));
     if (sigma <= best_sigma) continue;
     best_sigma = sigma;
     best = 1U << i;
@@ -313,7 +312,7 @@ NextExperiment sharpening_images(const FieldCase& field, const MotionResiduals& 
   next.reason =
       fmt::format("To know {} of {} better, image again with {}: {:.1f} sigmas from none instead of {:.1f}.",
                   parameter.name, named.hypothesis->name(), words_of(best), best_sigma,
-                  distance(fit.covariance(unknown, unknown)));
+                  distance(inference::estimate_covariance(fit.jacobian).matrix(unknown, unknown)));
   next.toml = file_of(named.volume_change_mL, best, next.reason);
   return next;
 }

@@ -250,20 +250,22 @@ void SpecimenProblem::take(const inference::SearchResult& found, JointProblem& p
   fit.termination = found.termination;
   fit.jacobian = MatrixXd::Zero(own + tolerances, unknowns + tolerances);
   fit.jacobian.topLeftCorner(own, unknowns) = problem.jacobian(found.q);
+  std::vector<inference::Parameter> parameters(static_cast<size_t>(unknowns + tolerances),
+                                               {.name = "tolerance"});
+  for (Index i = 0; i < unknowns; ++i)
+    parameters[static_cast<size_t>(i)] = problem.space()[i];
+  const inference::ParameterSpace space(parameters);
   inference::LinearModel at{found.q, found.residuals, {}};
+  at.q.conservativeResizeLike(VectorXd::Zero(unknowns + tolerances));
+  at.residuals.conservativeResizeLike(VectorXd::Zero(own + tolerances));
   if (tolerances > 0) {
     fit.jacobian.topRightCorner(own, tolerances).topRows(rows) = tolerances_;
     fit.jacobian.bottomRightCorner(tolerances, tolerances).setIdentity();
-    std::vector<inference::Parameter> all(static_cast<size_t>(unknowns + tolerances), {.name = "tolerance"});
-    for (Index i = 0; i < unknowns; ++i)
-      all[static_cast<size_t>(i)] = problem.space()[i];
     at.jacobian = fit.jacobian;
-    at.q.conservativeResizeLike(VectorXd::Zero(unknowns + tolerances));
-    at.residuals.conservativeResizeLike(VectorXd::Zero(own + tolerances));
-    move_to_minimum(at, inference::ParameterSpace(std::move(all)), is_free);
+    move_to_minimum(at, space, is_free);
   }
   const VectorXd& residuals = at.residuals;
-  const std::vector<double> values = problem.space().values(at.q.head(unknowns));
+  const std::vector<double> values = space.values(at.q);
   const size_t law = estimated_.values.size();
   fit.law.assign(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(law));
   for (size_t i = 0; i < fit.choice.free.size(); ++i) {
@@ -271,9 +273,10 @@ void SpecimenProblem::take(const inference::SearchResult& found, JointProblem& p
     fit.choice.values[value] = values[law + i];
     // Of the coordinate in which the parameter is reported.
     const auto column = static_cast<Index>(law + i);
-    const bool by_logarithm = problem.space()[column].scale == inference::Scale::logarithmic;
-    if (by_logarithm && fit.choice.parameter(value).scale == SearchScale::linear)
-      fit.jacobian.col(column) /= values[law + i];
+    const bool by_logarithm = space[column].scale == inference::Scale::logarithmic;
+    if (!by_logarithm || fit.choice.parameter(value).scale != SearchScale::linear) continue;
+    fit.jacobian.col(column) /= values[law + i];
+    parameters[law + i].scale = inference::Scale::linear;
   }
   fit.pressures_kPa.clear();
   for (const JointProblem::LoadedFrame& frame : problem.frames())
@@ -281,7 +284,7 @@ void SpecimenProblem::take(const inference::SearchResult& found, JointProblem& p
   fit.residuals = residuals.head(rows);
   fit.priors = residuals.tail(residuals.size() - rows);
   fit.chi_square = residuals.squaredNorm();
-  fit.covariance = inference::estimate_covariance(fit.jacobian, is_free).matrix;
+  estimate_covariance(fit, inference::ParameterSpace(std::move(parameters)), space.free_unknowns(at.q));
 }
 
 MatrixXd SpecimenProblem::columns_of(const std::vector<ChangedMotion::Perturbation>& changes) {

@@ -56,6 +56,9 @@ TEST(RunsAndImages, AModulusOfALawFileIsOneByItsUnit) {
 TEST(RunsAndImages, WhatImagesDoNotExplainSaysNothingOfTheModulus) {
   for (const Verdict verdict : {Verdict::unexplained, Verdict::ambiguous})
     EXPECT_EQ(with_imaged_modulus(gel(), of(verdict)).law.parameters.front().upper, 15.0);
+  Explanation on_bound = of(Verdict::named);
+  on_bound.law.front().after_error = 0.0;
+  EXPECT_EQ(with_imaged_modulus(gel(), on_bound).law.parameters.front().upper, 15.0);
   Study known = gel();
   known.law.parameters.front() = {"C1_kPa", 8.0, 7.99, 8.01, Variation::whole};
   EXPECT_EQ(with_imaged_modulus(known, of(Verdict::named)).law.parameters.front().upper, 8.01);

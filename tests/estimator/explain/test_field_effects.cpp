@@ -103,6 +103,17 @@ std::string test_name(const testing::TestParamInfo<const Effect*>& info) {
 
 INSTANTIATE_TEST_SUITE_P(List, EveryFieldEffect, testing::ValuesIn(field_effects()), test_name);
 
+TEST(FieldProblem, AModulusOnItsBoundHasNoErrorAndAddsNoneToTheOthers) {
+  FieldCase field = simulated_case({.pressures_kPa = {3.0}});
+  field.C1_bounds_kPa = {1.0, 7.5};
+  FieldProblem problem(field, small_mesh);
+  const FieldFit fit = problem.fit({}, problem.start());
+  EXPECT_EQ(fit.termination, inference::Termination::on_bound);
+  EXPECT_EQ(fit.covariance(0, 0), 0.0);
+  EXPECT_NEAR(fit.covariance(1, 1), 1.0 / fit.jacobian.col(1).squaredNorm(), 1e-9 * fit.covariance(1, 1));
+  EXPECT_TRUE(fit.undetermined.empty());
+}
+
 TEST(FieldProblem, FindsTheModulusOfABaseSpecimen) {
   FieldProblem problem(simulated_case({}), small_mesh);
   const FieldFit fit = problem.fit({}, problem.start());

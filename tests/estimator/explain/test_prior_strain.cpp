@@ -2,7 +2,7 @@
 
 #include "estimator/explain/imaging/prior_strain.hpp"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <cmath>
 
@@ -29,6 +29,18 @@ TEST(PriorStrain, IsTheDifferenceOfWhatTheReadingSaysAndWhatTheRestSays) {
     EXPECT_NEAR(strain.chi_square, std::pow(strain.off[0], 2), 1e-9);
     EXPECT_EQ(strain.degrees, 1.0);
   }
+}
+
+TEST(PriorStrain, IsTheSameBesideAnUnknownThatNothingShows) {
+  const PriorStrain alone = prior_strain(fit_of(7.0, 1.0, 3.0));
+  FieldFit fit = fit_of(7.0, 1.0, 3.0);
+  fit.jacobian.conservativeResizeLike(Eigen::MatrixXd::Zero(2, 2));
+  estimate_covariance(fit, inference::ParameterSpace({{"x"}, {"turn"}}), {true, true});
+  EXPECT_THAT(fit.undetermined, testing::ElementsAre("turn +1"));
+  const PriorStrain strain = prior_strain(fit);
+  EXPECT_NEAR(strain.off[0], alone.off[0], 1e-12);
+  EXPECT_NEAR(strain.chi_square, alone.chi_square, 1e-12);
+  EXPECT_EQ(strain.degrees, 1.0);
 }
 
 TEST(PriorStrain, IsNoneWhereOnlyTheReadingTells) {

@@ -12,30 +12,26 @@ LinearModel three_unknowns() {
 
 TEST(LinearModel, MovesToItsMinimum) {
   LinearModel model = three_unknowns();
-  std::vector<bool> is_free(3, true);
-  move_to_minimum(model, ParameterSpace({{"x"}, {"y"}, {"z"}}), is_free);
+  move_to_minimum(model, ParameterSpace({{"x"}, {"y"}, {"z"}}), {true, true, true});
   EXPECT_LT((model.q - Eigen::Vector3d(1.5, 1.5, 0.0)).norm(), 1e-12);
   EXPECT_LT(model.chi_square(), 1e-24);
-  EXPECT_EQ(is_free, std::vector<bool>(3, true));
 }
 
 TEST(LinearModel, BesideABoundThatStopsOneTheOthersHaveTheirOwnMinimum) {
   LinearModel model = three_unknowns();
-  std::vector<bool> is_free(3, true);
-  move_to_minimum(model, ParameterSpace({{"x", "", 0.0, 0.5}, {"y"}, {"z"}}), is_free);
+  const ParameterSpace space({{"x", "", 0.0, 0.5}, {"y"}, {"z"}});
+  move_to_minimum(model, space, {true, true, true});
   // At x = 0.5 chi-square is least where y - 2.5 + (y - 0.5) / 4 = 0.
   EXPECT_LT((model.q - Eigen::Vector3d(0.5, 2.1, 0.0)).norm(), 1e-12);
   EXPECT_NEAR(model.chi_square(), 0.4 * 0.4 + 1.6 * 1.6 / 4.0, 1e-12);
-  EXPECT_EQ(is_free, std::vector<bool>({false, true, true}));
+  EXPECT_EQ(space.free_unknowns(model.q), std::vector<bool>({false, true, true}));
 }
 
 TEST(LinearModel, WhatIsNotFreeStays) {
   LinearModel model = three_unknowns();
-  std::vector<bool> is_free{false, true, false};
-  move_to_minimum(model, ParameterSpace({{"x"}, {"y", "", 0.0, 1.0}, {"z"}}), is_free);
+  move_to_minimum(model, ParameterSpace({{"x"}, {"y", "", 0.0, 1.0}, {"z"}}), {false, true, false});
   EXPECT_EQ(model.q, Eigen::Vector3d(0.0, 1.0, 0.0));
   EXPECT_NEAR(model.chi_square(), 4.25, 1e-12);
-  EXPECT_EQ(is_free, std::vector<bool>(3, false));
 }
 
 }  // namespace
