@@ -116,6 +116,20 @@ TEST(Documents, TheTreeInTheArchitectureNamesEveryFolder) {
   }
 }
 
+// The walks of ARCHITECTURE.md lead past each header of the rooms whose names alone say little.
+TEST(Documents, TheWalksInTheArchitectureNameEveryHeaderOfFitAndExplain) {
+  const std::string text = text_of(root / "ARCHITECTURE.md");
+  for (const char* room :
+       {"estimator/fit", "estimator/explain/rig", "estimator/explain/imaging", "estimator/explain/verdict"}) {
+    for (const auto& entry : fs::directory_iterator(root / room)) {
+      if (entry.path().extension() != ".hpp") continue;
+      const std::string header = fs::relative(entry.path(), root).generic_string();
+      EXPECT_NE(text.find("(" + header + ")"), std::string::npos)
+          << "ARCHITECTURE.md does not name " << header;
+    }
+  }
+}
+
 // A comment may send the reader to another header only if there is one: beside the file, or anywhere by the end of its path.
 TEST(Documents, EveryHeaderThatACommentNamesExists) {
   static const std::regex header(R"(//[^\n]*?([\w./-]+\.hpp))");

@@ -6,6 +6,16 @@
 // and the effects' values, by Laplace's approximation about the fit. A size's logarithm is uniform over two decades
 // (ln 100 = 4.6; of both signs, over twice that), other parameters are uniform within their bounds; an effect is there
 // in one session of forty, and as many change points are possible as there are cycles.
+//
+// Words of these files:
+//   u          the nuisances (modulus, offsets, tolerances) in sds of what is known of them beforehand
+//   shares     how large the model's error is, one number for each group of features (model_error.hpp)
+//   given      effects that the study's model has already: they are in every set
+//   plain      the set without effects but the given ones
+//   described  how far parts may be off by the list of tolerances or the rig's file; finer: all of them so many times less
+//   in reach   less far behind the best set than fits bring that go on from linear tolerances: 50 nats; near: the plain set,
+//              where it is in reach of the best single effect as fitted; behind: a set of a finer rig, out of reach of what the described one has
+//   strained   of a set that needs a part of the rig further off than is seldom by chance (part_strain.hpp)
 
 #include <cmath>
 #include <functional>
