@@ -20,7 +20,8 @@ struct LinearisedModel {
   }
 };
 
-/// The rig as declared, with effects that it is known to have, and the modulus and offsets that fit.
+/// The rig as declared, with effects that it is known to have, and the modulus and offsets that fit: where searches begin. Nothing rests on how
+/// its own fits ended.
 LinearisedModel declared_rig(const SessionProblem& problem, SessionModel with = {});
 
 }  // namespace diastole::rig
