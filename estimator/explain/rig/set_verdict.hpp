@@ -2,8 +2,9 @@
 // From sets of effects with their probabilities to a verdict: significant, material, settled.
 //
 // An effect is material if what it changes, modulus and offsets having followed, is larger than the model's own error in some
-// channel (0.1 % of the range at least: no instrument is better) and than a tenth of the set's largest, and if parts of the
-// declared rig would have to be two sds off to do the same: what is nearer is a tolerance. Immaterial ones are hints and
+// channel (0.1 % of the range at least: no instrument is better), if parts of the declared rig would have to be two sds off to do the
+// same (what is nearer is a tolerance), and if it is a tenth of the set's largest or its odds hold beside an error of a tenth in the others'
+// equations (equation_errors.hpp). Immaterial ones are hints and
 // named by nobody: probabilities of sets that differ by them add. A set is named with a probability of
 // nine tenths; sets that are less certain are ambiguous. It has to have the same odds on waveforms that it was not fitted to
 // alone, against the model without it and against a smooth discrepancy of like freedom (held_out.hpp). Where even the best set needs a model's error larger than what is
@@ -30,7 +31,7 @@ struct ErrorKnowledge {
 };
 
 /// The rules, in this order. A set stands for all that differ from it by hints alone: effects that are smaller than `least_size` times
-/// the model's error or than a tenth of the largest one, or that tolerances make as well.
+/// the model's error, or than a tenth of the largest one and its equations' error, or that tolerances make as well.
 ///
 ///   unexplained  a part of the model's error, or of the rig, is as far off in 2.3 % by chance, or equal cycles differ as seldom as in
 ///                0.1 %, or a search that the verdict rests on did not settle: of the rig without effects, of the set (to all data and to

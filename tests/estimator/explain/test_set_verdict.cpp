@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "estimator/explain/rig/equation_errors.hpp"
 #include "estimator/rig_fit/simulated_session.hpp"
 
 namespace diastole::explain {
@@ -56,6 +57,35 @@ TEST(SetVerdict, WhatTheModulusTakesOfAChangeMakesItNoTolerance) {
   EXPECT_TRUE(size_of_change(problem, plain, 100.0 * modulus + tolerance).is_tolerance);
   EXPECT_FALSE(size_of_change(problem, plain, own).is_tolerance);
   EXPECT_FALSE(size_of_change(problem, plain, 1000.0 * modulus + own).is_tolerance);
+}
+
+TEST(EquationErrors, TakeTheGainOfWhatActsWhereALargerEffectDoes) {
+  const rig::SpecimenFamily family = rig::gel_family();
+  const rig::Session session = rig::simulated_session(family, {.terms = {}, .values = {}, .seed = 5});
+  const rig::SessionProblem problem(session, family, 2);
+  EffectSet set = search_sets(problem).sets.back();
+  set.model.terms = {{find_effect("cannula-leak-cavity"), {}}, {find_effect("sensor-drift"), {}}};
+  const Eigen::MatrixXd nuisances = set.columns.rightCols(set.model.nuisances.size());
+  const Eigen::VectorXd of_nuisances = set.evidence.estimate.tail(nuisances.cols());
+  set.columns = Eigen::MatrixXd::Zero(nuisances.rows(), nuisances.cols() + 2);
+  set.columns.rightCols(nuisances.cols()) = nuisances;
+  set.evidence.estimate = Eigen::VectorXd::Zero(set.columns.cols());
+  set.evidence.estimate.tail(of_nuisances.size()) = of_nuisances;
+  // What no smooth part of a rig does, in the first half of the features: sixty sds up and down.
+  const Eigen::Index half = nuisances.rows() / 2;
+  Eigen::MatrixXd changes = Eigen::MatrixXd::Zero(nuisances.rows(), 2);
+  for (Eigen::Index k = 0; k < half; ++k)
+    changes(k, 0) = (k % 2 == 0 ? 60.0 : -60.0) * std::sqrt(set.evidence.variance[k]);
+  const auto gain = [&] {
+    return 0.5 * changes.col(1).cwiseAbs2().cwiseQuotient(set.evidence.variance).sum();
+  };
+
+  changes.col(1) = 0.05 * changes.col(0);
+  EXPECT_GT(loss_beside_equation_errors(problem, set, changes, 1), 0.9 * gain());
+  changes.col(1).setZero();
+  for (Eigen::Index k = half; k < changes.rows(); ++k)
+    changes(k, 1) = (k % 2 == 0 ? 3.0 : -3.0) * std::sqrt(set.evidence.variance[k]);
+  EXPECT_LT(std::abs(loss_beside_equation_errors(problem, set, changes, 1)), 0.1 * gain());
 }
 
 TEST(SetVerdict, WhatTheDataSpeakForAndNewWaveformsDoNotBearMayBeNothing) {
