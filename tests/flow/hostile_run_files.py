@@ -255,9 +255,11 @@ def after(file, tampered):
 HOSTILE = [external_link, external_group, user_defined_link, damaged_group, external_storage, virtual_dataset, rows_that_are_not_there,
            chunks_that_are_not_there, one_chunk_that_unpacks_to_much, more_triggers_than_any_recording_has, table_that_is_not_there, one_text_many_times,
            one_waveform_many_times, text_of_a_fixed_length,
-           set_of_numbers_in_two_dimensions, a_type_of_its_own, one_dataset_as_every_flow, flow_of_no_segment, waveform_of_no_segment,
-           one_dataset_as_many_channels, more_channels_than_an_instrument_has, channels_of_large_chunks, long_notes_on_every_channel,
-           events_that_unpack_to_many, gaps_that_unpack_to_many, triggers_that_unpack_to_many]
+           set_of_numbers_in_two_dimensions, a_type_of_its_own]
+# What a reader takes of the whole file, or of objects that stand for each other: no fault of one that is asked for alone.
+HOSTILE_IN_SUM = [one_dataset_as_every_flow, flow_of_no_segment, waveform_of_no_segment, one_dataset_as_many_channels,
+                  more_channels_than_an_instrument_has, channels_of_large_chunks, long_notes_on_every_channel, events_that_unpack_to_many,
+                  gaps_that_unpack_to_many, triggers_that_unpack_to_many]
 
 
 def limited():
@@ -277,7 +279,7 @@ def main():
                               preexec_fn=limited)
         assert sane.returncode == 0, f"the run itself is not read in {MOST_MEMORY >> 20} MB: {sane.stderr}"
         failures = []
-        for tampered in HOSTILE:
+        for tampered in HOSTILE + HOSTILE_IN_SUM:
             file = place / "hostile.run.h5"
             shutil.copy(sound, file)
             with h5py.File(file, "r+") as run:
@@ -294,7 +296,7 @@ def main():
                                     f"expected 2 and '{expected}'; said: {ended.stderr.strip()[:300]}")
                 if file.read_bytes() != before:
                     failures.append(f"{tampered.__name__}, {command[0]}: the file was changed")
-        print(f"{len(HOSTILE)} hostile files")
+        print(f"{len(HOSTILE + HOSTILE_IN_SUM)} hostile files")
         sys.exit("\n".join(failures) if failures else 0)
     finally:
         shutil.rmtree(place)

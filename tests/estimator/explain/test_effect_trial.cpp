@@ -11,20 +11,22 @@ namespace {
 
 using testing::HasSubstr;
 
-/// A size `G`, and a second parameter that leaks may open at.
+/// Of a size `G` and, where the equation reads it, a pressure at which leaks open.
 std::shared_ptr<const Effect> effect_with(const std::string& port, const std::string& unit,
                                           const std::string& equation) {
+  const bool opens = equation.find("p_lift") != std::string::npos;
   return effect_of_text(
       "format = \"diastole-effect\"\nversion = 1\nid = \"mine\"\ntitle = \"mine\"\nport = \"" + port +
       "\"\n[[parameter]]\nname = \"G\"\nunit = \"" + unit +
-      "\"\nneutral = 0.0\nbounds = [0.0, 1.0]\ntypical = 0.05\n[[parameter]]\nname = \"p_lift\"\nunit = "
-      "\"kPa\"\n"
-      "neutral = 5.0\nbounds = [0.5, 20.0]\nscale = \"logarithmic\"\n[equations]\n" +
-      equation + "\n");
+      "\"\nneutral = 0.0\nbounds = [0.0, 1.0]\ntypical = 0.05\n" +
+      (opens ? "[[parameter]]\nname = \"p_lift\"\nunit = \"kPa\"\nneutral = 5.0\nbounds = [0.5, 20.0]\n"
+               "scale = \"logarithmic\"\n"
+             : "") +
+      "[equations]\n" + equation + "\n");
 }
 
 TEST(EffectTrial, FindsNothingWhereThereAreNoPressures) {
-  const auto effect = effect_with("sensor", "kPa", "p_seen = \"p + G / (2 - 2)\"");
+  const auto effect = effect_with("sensor", "kPa", "p_seen = \"p + G * log(1 - t / 2 [s])\"");
   const EffectTrial trial(*effect);
   for (const EffectCheck& check : {trial.found_again(), trial.silent()}) {
     EXPECT_FALSE(check.passed) << check.name;

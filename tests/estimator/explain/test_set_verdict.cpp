@@ -71,11 +71,14 @@ TEST(EquationErrors, TakeTheGainOfWhatActsWhereALargerEffectDoes) {
   set.columns.rightCols(nuisances.cols()) = nuisances;
   set.evidence.estimate = Eigen::VectorXd::Zero(set.columns.cols());
   set.evidence.estimate.tail(of_nuisances.size()) = of_nuisances;
-  // What no smooth part of a rig does, in the first half of the features: sixty sds up and down.
-  const Eigen::Index half = nuisances.rows() / 2;
+  // What no smooth part of a rig does, up and down: the larger one in every other pair of features, by sixty sds.
   Eigen::MatrixXd changes = Eigen::MatrixXd::Zero(nuisances.rows(), 2);
-  for (Eigen::Index k = 0; k < half; ++k)
-    changes(k, 0) = (k % 2 == 0 ? 60.0 : -60.0) * std::sqrt(set.evidence.variance[k]);
+  const auto set_pairs = [&](Eigen::Index effect, Eigen::Index first, double sds) {
+    for (Eigen::Index k = first; k + 1 < changes.rows(); k += 4)
+      for (Eigen::Index i = 0; i < 2; ++i)
+        changes(k + i, effect) = (i == 0 ? sds : -sds) * std::sqrt(set.evidence.variance[k + i]);
+  };
+  set_pairs(0, 0, 60.0);
   const auto gain = [&] {
     return 0.5 * changes.col(1).cwiseAbs2().cwiseQuotient(set.evidence.variance).sum();
   };
@@ -83,8 +86,7 @@ TEST(EquationErrors, TakeTheGainOfWhatActsWhereALargerEffectDoes) {
   changes.col(1) = 0.05 * changes.col(0);
   EXPECT_GT(loss_beside_equation_errors(problem, set, changes, 1), 0.9 * gain());
   changes.col(1).setZero();
-  for (Eigen::Index k = half; k < changes.rows(); ++k)
-    changes(k, 1) = (k % 2 == 0 ? 3.0 : -3.0) * std::sqrt(set.evidence.variance[k]);
+  set_pairs(1, 2, 3.0);
   EXPECT_LT(std::abs(loss_beside_equation_errors(problem, set, changes, 1)), 0.1 * gain());
 }
 
