@@ -21,6 +21,7 @@ struct Character {
 Character first_of(std::string_view text) {
   const auto byte = [&](size_t i) { return static_cast<uint8_t>(text[i]); };
   const uint8_t lead = byte(0);
+  if (text.starts_with("\r\n")) return {2, '\n'};  // Windows' line end
   if (lead < 0x80) return {1, lead};
   const size_t bytes = lead >= 0xf0 ? 4 : lead >= 0xe0 ? 3 : 2;
   constexpr uint32_t least_of[] = {0, 0, 0x80, 0x800, 0x10000};
