@@ -91,11 +91,10 @@ class Reader {
     if (effect_.laws.empty() && effect_.constants.empty())
       equations.fail("", "sets nothing of the rig", fmt::format("Write one of {}.", settable()));
     require_use(parameters);
-    try {
-      require_finite();
-    } catch (const std::length_error& error) {
-      root_.fail("equations", error.what(), "Shorten the equations.");
-    }
+    require_finite();
+    if (!effect_.laws.empty())
+      make_of_formula(law_text_.file, law_text_.place(0),
+                      [&] { require_form(effect_.laws.front().sets, effect_.laws.front().node, law_text_); });
     read_text();
     root_.finish();
     return std::move(effect_);
@@ -268,8 +267,9 @@ class Reader {
       const NodeId node =
           expressions::parse_formula_in(text, scope_, effect_.graph, known_unit(about.unit), name);
       require_inputs(*law, node, text);
-      make_of_formula(text.file, text.place(0), [&] { require_form(*law, node, text); });
       effect_.laws.push_back({*law, node, text.place(0)});
+      asked_.push_back({text, node});
+      law_text_ = text;
     } else if (const In* constant = constant_named(name)) {
       require_port(table, name, port_of(*constant));
       const NodeId node = expressions::parse_formula_in(
@@ -281,6 +281,7 @@ class Reader {
                "Make it of parameters and other constants.");
       }
       effect_.constants.push_back({*constant, node, text.place(0)});
+      asked_.push_back({text, node});
     } else {
       if (!expressions::is_name(name) || has_meaning(name))
         table.fail(name, "has a meaning already and cannot be set",
@@ -377,7 +378,8 @@ class Reader {
   void require_finite() const {
     std::vector<expressions::Program> formulas, initial;
     for (const Asked& formula : asked_)
-      formulas.push_back(program(formula.node));
+      make_of_formula(formula.text.file, formula.text.place(0),
+                      [&] { formulas.push_back(program(formula.node)); });
     for (const FileState& state : effect_.states)
       initial.push_back(program(state.initial));
     for (const bool in_motion : {false, true}) {
@@ -421,6 +423,7 @@ class Reader {
   Scope scope_;
   std::vector<Unit> state_units_;
   std::vector<Asked> asked_;
+  PlacedText law_text_;   ///< of the law, if there is one
   std::string formulas_;  ///< all of them
 };
 

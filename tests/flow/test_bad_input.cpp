@@ -182,7 +182,7 @@ std::vector<BadInput> table() {
       {"AnEffectWithoutALimitAtRest",
        [](Place place) { return own_effect(place, "log(p_pump / 10 [kPa])"); },
        2,
-       {"own.effect.toml", "key equations.q_hose", "not a finite number", "at rest"}},
+       {"own.effect.toml", "key equations.q_hose", "not a finite number", "p_pump = 0 kPa", "at rest"}},
       {"AnEffectWithADivisionByZero",
        [](Place place) { return own_effect(place, "abs(p_pump) / 0 [kPa]"); },
        2,

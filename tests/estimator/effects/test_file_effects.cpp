@@ -202,6 +202,65 @@ TEST(FileEffects, RefuseWhatNoRigCanDo) {
     EXPECT_FALSE(fault_of(port, rest).remedy.empty()) << rest;
 }
 
+TEST(FileEffects, RefuseAFormulaThatIsNotFiniteAtRestOrInMotion) {
+  for (const auto& [term, with] :
+       {std::pair{"1 [s] / t", "t = 0 s"}, std::pair{"log(p / 1 [kPa])", "p = 0 kPa"},
+        std::pair{"(p / 1 [kPa])^1e308", "p = 5 kPa"},
+        std::pair{"(1 / (1 - G * 1 [s kPa/mL]))", "G = 1 mL/(s kPa)"}}) {
+    const InputFault fault =
+        fault_of("sensor", "[equations]\np_seen = \"p + G * 1 [s kPa^2/mL] * " + std::string(term) + "\"\n");
+    EXPECT_EQ(fault.place, "line 12, column 11, key equations.p_seen") << term;
+    EXPECT_NE(fault.problem.find("is not a finite number with"), std::string::npos) << fault.problem;
+    EXPECT_NE(fault.problem.find(with), std::string::npos) << fault.problem;
+    EXPECT_FALSE(fault.remedy.empty());
+  }
+  effect_with("sensor", "[equations]\np_seen = \"p + if(t > 0 [s], G * 1 [s^2 kPa^2/mL] / t, 0)\"\n");
+}
+
+TEST(FileEffects, RefuseAParameterThatNoFormulaUses) {
+  const InputFault fault =
+      fault_of("sensor",
+               "[[parameter]]\nname = \"H\"\nunit = \"kPa\"\nneutral = 0\nbounds = [0, 1]\n"
+               "[equations]\nh = \"2 * t\"\np_seen = \"p + G * 1 [s kPa^2/mL]\"\n");
+  EXPECT_EQ(fault.place, "line 12, key parameter[1].name");
+  EXPECT_EQ(fault.problem, "no formula uses H");
+  // A curve that is nothing is where a term begins to be learnt.
+  effect_with("sensor",
+              "[[curve]]\nname = \"law\"\nof = \"kPa\"\nunit = \"s kPa^2/mL\"\nat = [-1, 0, 1]\n"
+              "values = [0, 0, 0]\n[equations]\np_seen = \"p + G * law(p)\"\n");
+}
+
+TEST(FileEffects, ListWhatThePortKnows) {
+  const InputFault fault = fault_of("sensor", "[equations]\np_seen = \"p + V_command\"\n");
+  EXPECT_NE(fault.problem.find("no quantity \"V_command\""), std::string::npos) << fault.problem;
+  EXPECT_EQ(fault.remedy.find("V_command"), std::string::npos) << fault.remedy;
+  EXPECT_NE(fault.remedy.find("t_session"), std::string::npos) << fault.remedy;
+  EXPECT_NE(fault_of("drive", "[equations]\nV_piston = \"x\"\n").remedy.find("V_command"), std::string::npos);
+  EXPECT_EQ(fault_of("sensor", "[equations]\nV_command = \"G\"\n").place, "line 12, key equations.V_command");
+}
+
+TEST(FileEffects, RefuseANeutralConstantBeyondTheBounds) {
+  const InputFault fault = fault_of("drive",
+                                    "[[parameter]]\nname = \"c\"\nunit = \"m/s\"\nneutral = \"c_hose\"\n"
+                                    "bounds = [500, 600]\n[equations]\nc_hose = \"c\"\n");
+  EXPECT_EQ(fault.place, "line 14, key parameter[1].neutral");
+  EXPECT_NE(fault.problem.find("c_hose is 400"), std::string::npos) << fault.problem;
+}
+
+TEST(FileEffects, RefuseFormulasOfMoreThanAProgramHolds) {
+  std::string definitions, sum, product;
+  for (int i = 0; i < 600; ++i) {
+    const std::string name = "a" + std::to_string(i);
+    definitions += name + " = \"sin(t / " + std::to_string(i + 1) + " [s])\"\n";
+    sum += (i > 0 ? " + " : "") + name;
+    product += (i > 0 ? " * " : "") + name;
+  }
+  const InputFault fault =
+      fault_of("sensor", "[equations]\n" + definitions + "p_seen = \"p + G * 1 [s kPa^2/mL] * (" + sum +
+                             ") * (" + product + ")\"\n");
+  EXPECT_EQ(fault.problem, "the formulas are too long");
+}
+
 /// What is read and has no slopes that a program could hold.
 TEST(FileEffects, RefuseAFormulaOfWhichNothingCanBeMadeWithItsPlace) {
   std::string chain = "[equations]\na0 = \"t / 1 [s]\"\n";
