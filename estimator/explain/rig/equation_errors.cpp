@@ -40,27 +40,10 @@ MatrixXd alike_errors(const rig::SegmentFeatures& features, const VectorXd& chan
   return all;
 }
 
-/// The columns of a set's linear unknowns (values, moments, nuisances) but those of one effect.
-std::vector<Index> columns_without(const EffectSet& set, size_t effect) {
-  std::vector<Index> kept;
-  Index at = 0;
-  const auto keep = [&](size_t term, size_t count) {
-    for (size_t i = 0; i < count; ++i, ++at)
-      if (term != effect) kept.push_back(at);
-  };
-  const auto& terms = set.model.terms;
-  for (size_t term = 0; term < terms.size(); ++term)
-    keep(term, terms[term].effect->parameters().size());
-  for (size_t term = 0; term < terms.size(); ++term)
-    keep(term, terms[term].change_points.size());
-  keep(terms.size(), static_cast<size_t>(set.columns.cols() - at));
-  return kept;
-}
-
 }  // namespace
 
-double loss_beside_equation_errors(const rig::SessionProblem& problem, const EffectSet& set,
-                                   const MatrixXd& changes, size_t effect) {
+double log_odds_beside_equation_errors(const rig::SessionProblem& problem, const EffectSet& set,
+                                       const EffectSet& without, const MatrixXd& changes, size_t effect) {
   rig::ModelError error = problem.error();
   MatrixXd repeated(changes.rows(), 0);
   for (Index other = 0; other < changes.cols(); ++other) {
@@ -70,17 +53,13 @@ double loss_beside_equation_errors(const rig::SessionProblem& problem, const Eff
     repeated.conservativeResize(Eigen::NoChange, repeated.cols() + errors.cols());
     repeated.rightCols(errors.cols()) = errors;
   }
-  const VectorXd without_it = set.target() + changes.col(static_cast<Index>(effect));
-  const MatrixXd other_columns = set.columns(Eigen::all, columns_without(set, effect));
-  const auto gain = [&](const rig::ModelError& of, const MatrixXd& errors) {
-    const auto chi_square = [&](const VectorXd& target, const MatrixXd& columns) {
-      MatrixXd all(columns.rows(), columns.cols() + errors.cols());
-      all << columns, errors;
-      return fit_linear(target, all, of, set.evidence.shares).chi_square;
-    };
-    return 0.5 * (chi_square(without_it, other_columns) - chi_square(set.target(), set.columns));
+  const auto log_posterior = [&](const EffectSet& of) {
+    MatrixXd columns(changes.rows(), of.columns.cols() + repeated.cols());
+    columns << of.columns, repeated;
+    return of.log_posterior - of.evidence.log_evidence +
+           fit_with_shares(of.target(), columns, error, of.evidence.shares).log_evidence;
   };
-  return gain(problem.error(), MatrixXd(changes.rows(), 0)) - gain(error, repeated);
+  return log_posterior(set) - log_posterior(without);
 }
 
 }  // namespace diastole::explain

@@ -13,9 +13,10 @@
 
 namespace diastole::explain {
 
-/// By how much less ln likelihood one effect of a set gains where the equations of the others err so. `changes`: what each of the set's
-/// effects changes of the features, a column each.
-double loss_beside_equation_errors(const rig::SessionProblem& problem, const EffectSet& set,
-                                   const Eigen::MatrixXd& changes, size_t effect);
+/// ln of the odds of a set against the one without one of its effects where the equations of the others err so. `changes`: what each of
+/// the set's effects changes of the features, a column each.
+double log_odds_beside_equation_errors(const rig::SessionProblem& problem, const EffectSet& set,
+                                       const EffectSet& without, const Eigen::MatrixXd& changes,
+                                       size_t effect);
 
 }  // namespace diastole::explain

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <numbers>
 
@@ -115,12 +114,13 @@ bool outlasts_equation_errors(const rig::SessionProblem& problem, const EffectSe
   for (size_t i = 0; i < set.model.terms.size(); ++i)
     if (i != effect) others.emplace_back(set.model.terms[i].effect->text().id);
   std::ranges::sort(others);
-  double rival = -std::numeric_limits<double>::infinity();
+  const EffectSet* rival = nullptr;
   for (const EffectSet& without : search.sets)
-    if (without.ids() == others && inference::is_settled(without.termination))
-      rival = std::max(rival, without.log_posterior);
-  return std::isfinite(rival) &&
-         set.log_posterior - rival - loss_beside_equation_errors(problem, set, changes, effect) > sure_odds;
+    if (without.ids() == others && inference::is_settled(without.termination) &&
+        (rival == nullptr || without.log_posterior > rival->log_posterior))
+      rival = &without;
+  return rival != nullptr &&
+         log_odds_beside_equation_errors(problem, set, *rival, changes, effect) > sure_odds;
 }
 
 /// What a set's effects change each, over the model's error.

@@ -79,15 +79,26 @@ TEST(EquationErrors, TakeTheGainOfWhatActsWhereALargerEffectDoes) {
         changes(k + i, effect) = (i == 0 ? sds : -sds) * std::sqrt(set.evidence.variance[k + i]);
   };
   set_pairs(0, 0, 60.0);
-  const auto gain = [&] {
-    return 0.5 * changes.col(1).cwiseAbs2().cwiseQuotient(set.evidence.variance).sum();
+  const auto odds_beside = [&](const Eigen::MatrixXd& of) {
+    EffectSet without = set;
+    without.evidence.left += of.col(1);
+    return log_odds_beside_equation_errors(problem, set, without, of, 1);
   };
+  const auto odds_alone = [&] {
+    Eigen::MatrixXd alone = changes;
+    alone.col(0).setZero();
+    return odds_beside(alone);
+  };
+  const double sure = std::log(9.0);
 
-  changes.col(1) = 0.05 * changes.col(0);
-  EXPECT_GT(loss_beside_equation_errors(problem, set, changes, 1), 0.9 * gain());
+  // A fifth of what the equations may err by, in all of some twenty octaves and kinds.
+  changes.col(1) = 0.02 * changes.col(0);
+  EXPECT_GT(odds_alone(), sure);
+  EXPECT_LT(odds_beside(changes), sure);
   changes.col(1).setZero();
   set_pairs(1, 2, 3.0);
-  EXPECT_LT(std::abs(loss_beside_equation_errors(problem, set, changes, 1)), 0.1 * gain());
+  EXPECT_GT(odds_alone(), sure);
+  EXPECT_GT(odds_beside(changes), sure);
 }
 
 TEST(SetVerdict, WhatTheDataSpeakForAndNewWaveformsDoNotBearMayBeNothing) {
