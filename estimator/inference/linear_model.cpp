@@ -30,25 +30,39 @@ void LinearModel::move_to(const Eigen::VectorXd& to, const Eigen::VectorXd& resi
 }
 
 void move_to_minimum(LinearModel& model, const ParameterSpace& space, std::vector<bool> is_free) {
-  for (bool is_stopped = true; is_stopped;) {
+  const std::vector<bool> may_move = is_free;
+  // Each round a bound stops an unknown, or lets one go that is better off within (active set; degenerate ones might do both for ever).
+  for (Eigen::Index round = 0; round < 3 * space.size() + 1; ++round) {
     std::vector<Eigen::Index> free;
     for (Eigen::Index i = 0; i < space.size(); ++i)
       if (is_free[static_cast<size_t>(i)]) free.push_back(i);
-    if (free.empty()) return;
-    const Eigen::MatrixXd columns = model.jacobian(Eigen::all, free);
-    Eigen::VectorXd wanted = model.q;
-    wanted(free) -= columns.colPivHouseholderQr().solve(model.residuals);
-    const Eigen::VectorXd within = space.clamped(wanted);
-    is_stopped = within != wanted;
-    // Where a bound stops some of them they alone go there, and the others are sought anew beside them.
-    Eigen::VectorXd to = is_stopped ? model.q : wanted;
+    Eigen::VectorXd step = Eigen::VectorXd::Zero(space.size());
+    if (!free.empty())
+      step(free) =
+          -Eigen::MatrixXd(model.jacobian(Eigen::all, free)).colPivHouseholderQr().solve(model.residuals);
+    const Eigen::VectorXd within = space.clamped(model.q + step);
+    double part = 1.0;  // of the step, up to the first bound
+    Eigen::Index stopped = -1;
     for (const Eigen::Index i : free) {
-      if (within[i] == wanted[i]) continue;
-      to[i] = within[i];
-      is_free[static_cast<size_t>(i)] = false;
+      if (within[i] == model.q[i] + step[i]) continue;
+      const double up_to = (within[i] - model.q[i]) / step[i];
+      if (stopped < 0 || up_to < part) part = up_to, stopped = i;
     }
-    model.residuals += columns * (to - model.q)(free);
-    model.q = to;
+    model.residuals += part * (model.jacobian * step);
+    model.q += part * step;
+    if (stopped >= 0) {
+      model.q[stopped] = within[stopped];
+      is_free[static_cast<size_t>(stopped)] = false;
+      continue;
+    }
+    const std::vector<bool> pressed = pressed_on_bounds(model, space);
+    Eigen::Index released = 0;
+    while (released < space.size() &&
+           (!may_move[static_cast<size_t>(released)] || is_free[static_cast<size_t>(released)] ||
+            pressed[static_cast<size_t>(released)]))
+      ++released;
+    if (released == space.size()) return;
+    is_free[static_cast<size_t>(released)] = true;
   }
 }
 
