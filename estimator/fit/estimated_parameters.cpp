@@ -49,7 +49,7 @@ EstimatedParameters estimated_parameters(const Study& study, const ElasticModel&
     const std::vector<ParameterGroup> groups = parameter.vary == Variation::whole
                                                    ? std::vector{whole_parameter(index)}
                                                    : each_element(index, model.mesh().element_count());
-    const std::string unit = parameter.name.ends_with("_kPa") ? "kPa" : "";
+    const std::string unit(of_law.unit == "1" ? "" : of_law.unit);
     const size_t first = estimated.values.size();
     estimated.runs.push_back({parameter, first, groups.size(), of_law.is_modulus()});
     const Smoothness& smoothness = parameter.smoothness;

@@ -182,7 +182,8 @@ SpecimenReach SpecimenFamily::reach(double volume_mL, double pressure_kPa) const
   const auto goes_on = [&](const PressureVolumePoint& at) {
     if (at.stiffness_kPa_per_mL <= 0.0) return false;
     if (points++ % stride != 0) return true;
-    reach = {.volume_mL = at.volume_change_mL, .pressure_kPa = modulus_kPa_ * at.pressure_kPa};
+    reach = {.volume_mL = at.volume_change_mL,
+             .pressure_kPa = modulus_kPa_ / solved_at_kPa_ * at.pressure_kPa};
     reach.is_end = reach.volume_mL < volume_mL && reach.pressure_kPa < pressure_kPa;  // unless it goes on
     return reach.is_end;
   };

@@ -67,7 +67,7 @@ class ExportFolder {
     if (folder.empty()) return;
     std::error_code error;
     const auto is_missing = [&](const fs::path& path) {
-      return fs::status(path, error).type() == fs::file_type::not_found;
+      return fs::symlink_status(path, error).type() == fs::file_type::not_found;
     };
     for (fs::path each = fs::absolute(folder); is_missing(each); each = each.parent_path())
       made_ = each;

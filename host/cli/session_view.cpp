@@ -12,6 +12,7 @@
 
 #include "host/cli/daemon_question.hpp"
 #include "protocol/contract/named_members.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole {
 namespace {
@@ -72,10 +73,9 @@ std::string pressure_words(double pressure_kPa) {
 
 /// The first `columns` characters of UTF-8 text, each one column wide.
 std::string clipped(const std::string& text, size_t columns) {
-  const auto begins = [](char byte) { return (static_cast<unsigned char>(byte) & 0xC0U) != 0x80U; };
   size_t end = 0;
   for (size_t characters = 0; end < text.size(); ++end) {
-    if (begins(text[end]) && characters++ == columns) break;
+    if (begins_character(text[end]) && characters++ == columns) break;
   }
   return text.substr(0, end);
 }

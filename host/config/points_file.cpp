@@ -19,8 +19,7 @@ class PointsReader {
  public:
   PointsReader(std::string_view text, const std::string& file, PointsOf of)
       : file_(file), of_(of), bytes_(text.size()) {
-    constexpr std::string_view byte_order_mark = "\xef\xbb\xbf";  // spreadsheets put it before UTF-8
-    if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
+    text = without_byte_order_mark(text);
     size_t line = 0;
     while (!text.empty()) {
       const size_t end = std::min(text.find('\n'), text.size());

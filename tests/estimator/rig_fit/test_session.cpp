@@ -74,6 +74,9 @@ typical = 8
   for (const double volume_mL : {-16.0, 16.0, 48.0})
     EXPECT_NEAR(family.plain().at(volume_mL).pressure_kPa / built_in.plain().at(volume_mL).pressure_kPa, 1.0,
                 1e-6);
+  constexpr double full_mL = 48.0, beyond_kPa = 1e3;
+  EXPECT_NEAR(family.reach(full_mL, beyond_kPa).pressure_kPa, 6.0 * family.plain().at(full_mL).pressure_kPa,
+              1e-3);
 }
 
 }  // namespace

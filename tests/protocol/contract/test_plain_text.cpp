@@ -7,7 +7,7 @@ namespace {
 
 TEST(PlainText, IsUtf8WithoutControlCharacters) {
   for (const char* text :
-       {"", "a note\n\tof two lines", "30 °C – warm", "\xF0\x9F\x92\xA7", "\xEF\xBF\xBD"}) {
+       {"", "a note\n\tof two lines", "of\r\nWindows", "30 °C – warm", "\xF0\x9F\x92\xA7", "\xEF\xBF\xBD"}) {
     EXPECT_EQ(why_not_plain(text), "") << text;
     EXPECT_EQ(made_plain(text), text);
   }

@@ -15,6 +15,7 @@
 #include "protocol/contract/named_members.hpp"
 #include "protocol/contract/plain_text.hpp"
 #include "protocol/contract/table_reader.hpp"
+#include "protocol/contract/text.hpp"
 #include "tools/diastole/commands.hpp"
 #include "tools/diastole/runs/catalogue.hpp"
 #include "tools/diastole/runs/runs_page.hpp"
@@ -74,10 +75,6 @@ json entry_json(const Entry& entry) {
           {"stiffness_se_kPa", or_null(entry.stiffness_se_kPa)}};
 }
 
-size_t width_of(const std::string& text) {
-  return static_cast<size_t>(std::ranges::count_if(text, [](char byte) { return (byte & 0xC0) != 0x80; }));
-}
-
 void show_table(const std::vector<Entry>& entries) {
   using Row = std::vector<std::string>;
   std::vector<Row> rows{
@@ -91,11 +88,11 @@ void show_table(const std::vector<Entry>& entries) {
   std::vector<size_t> widths(rows.front().size(), 0);
   for (const Row& row : rows)
     for (size_t i = 0; i < row.size(); ++i)
-      widths[i] = std::max(widths[i], width_of(row[i]));
+      widths[i] = std::max(widths[i], characters_of(row[i]));
   for (const Row& row : rows) {
     std::string line;
     for (size_t i = 0; i < row.size(); ++i)
-      line += i + 1 == row.size() ? row[i] : row[i] + std::string(widths[i] - width_of(row[i]) + 2, ' ');
+      line += i + 1 == row.size() ? row[i] : row[i] + std::string(widths[i] - characters_of(row[i]) + 2, ' ');
     fmt::print("{}\n", line);
   }
 }
