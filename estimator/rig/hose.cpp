@@ -97,28 +97,29 @@ double WallFriction::steady_kPa_per_m(double speed_m_s) const {
   return (share * turbulent + (1.0 - share) * laminar) * 1e-3;
 }
 
-WallFriction::Drag WallFriction::drag(double speed_m_s, double stretching) const {
-  const double speed = std::abs(speed_m_s);
-  const double place = speed * to_place_;
-  Drag drag;
-  double steady = 0.0;
-  if (place < static_cast<double>(table_size)) {
-    const auto k = static_cast<size_t>(place);
+void WallFriction::Drag::resize(size_t places) {
+  for (std::vector<double>* values : {&still_kPa_per_m, &by_rate, &forgetting})
+    values->assign(places, 0.0);
+}
+
+void WallFriction::set_drag(const double* speed_m_s, const double* stretching, Drag& drag) const {
+  constexpr auto last = static_cast<double>(table_size);
+  for (size_t i = 0; i < drag.by_rate.size(); ++i) {
+    const double speed = std::abs(speed_m_s[i]);
+    const double place = std::min(speed * to_place_, last);  // not a number stays none
+    const size_t k = place < last ? static_cast<size_t>(place) : table_size - 1;
     const Piece& piece = table_[k];
     const auto& [value, slope, square, cube] = piece.steady_kPa_per_m;
     const double s = place - static_cast<double>(k);
-    steady = value + s * (slope + s * (square + s * cube));
-    drag.by_rate = piece.inertia + s * piece.inertia_rise;
-    drag.forgetting = piece.forgetting + s * piece.forgetting_rise;
-  } else {
-    steady = steady_kPa_per_m(speed);
-    drag.by_rate = table_.back().inertia + table_.back().inertia_rise;
-    drag.forgetting = table_.back().forgetting + table_.back().forgetting_rise;
+    const double steady =
+        place < last ? value + s * (slope + s * (square + s * cube)) : steady_kPa_per_m(speed);
+    const double by_rate = piece.inertia + s * piece.inertia_rise;
+    const double turning = speed_m_s[i] / (speed + 1e-4);
+    drag.by_rate[i] = by_rate;
+    drag.forgetting[i] = piece.forgetting + s * piece.forgetting_rise;
+    drag.still_kPa_per_m[i] =
+        std::copysign(steady, speed_m_s[i]) + by_rate * wave_speed_m_s_ * turning * std::abs(stretching[i]);
   }
-  const double turning = speed_m_s / (speed + 1e-4);
-  drag.still_kPa_per_m =
-      std::copysign(steady, speed_m_s) + drag.by_rate * wave_speed_m_s_ * turning * std::abs(stretching);
-  return drag;
 }
 
 }  // namespace diastole::rig

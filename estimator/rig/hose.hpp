@@ -51,14 +51,17 @@ class WallFriction {
   [[nodiscard]] double steady_kPa_per_m(double speed_m_s) const;
   [[nodiscard]] double reynolds(double speed_m_s) const;
 
-  /// The gradient as it depends on dv/dt: still + by_rate dv/dt.
+  /// The gradient at several places as it depends on dv/dt: still + by_rate dv/dt.
   struct Drag {
-    double still_kPa_per_m = 0.0;
-    double by_rate = 0.0;     ///< kPa s^2/m^2
-    double forgetting = 0.0;  ///< 1/s: how much faster turbulence wipes out the boundary layer's memory
+    std::vector<double> still_kPa_per_m;
+    std::vector<double> by_rate;  ///< kPa s^2/m^2
+    std::vector<double>
+        forgetting;  ///< 1/s: how much faster turbulence wipes out the boundary layer's memory
+
+    void resize(size_t places);
   };
-  /// Interpolated in Re, within 1e-4. `stretching` is dv/dx, 1/s.
-  [[nodiscard]] Drag drag(double speed_m_s, double stretching) const;
+  /// At as many places as `drag` has; interpolated in Re, within 1e-4. `stretching` is dv/dx, 1/s.
+  void set_drag(const double* speed_m_s, const double* stretching, Drag& drag) const;
 
  private:
   /// Between two of even steps of Re: the steady gradient's cubic in the place between them, and rho k / 2.

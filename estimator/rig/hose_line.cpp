@@ -180,14 +180,14 @@ void HoseLine::remember(bool is_settled) {
   double speed = 0.0, forgetting = 0.0;
   for (Index g = 0; g < point_weight_.size(); ++g) {
     speed += point_part_[g] * speed_[g];
-    forgetting += point_part_[g] * drag_[static_cast<size_t>(g)].forgetting;
+    forgetting += point_part_[g] * drag_.forgetting[static_cast<size_t>(g)];
   }
   if (is_settled) layer_.pass(speed, forgetting);
   const double gradient = is_settled ? layer_.drag() : layer_.drag_after(speed, forgetting);
-  for (WallFriction::Drag& drag : drag_) {
-    drag.still_kPa_per_m += gradient;
-    drag.by_rate += layer_.inertia();
-  }
+  for (double& still : drag_.still_kPa_per_m)
+    still += gradient;
+  for (double& by_rate : drag_.by_rate)
+    by_rate += layer_.inertia();
 }
 
 void HoseLine::forces(const EndLoads& loads, int passes, bool is_settled) {
@@ -196,25 +196,22 @@ void HoseLine::forces(const EndLoads& loads, int passes, bool is_settled) {
   if (yields_) bare_[0] += loads.pump_kPa;
   speeds_.times_from(state_, count_, speed_);
   const Index points = point_weight_.size();
-  const Index stretches = speed_.size() / 2;
-  for (Index g = 0; g < points; ++g) {
+  for (Index g = 0; g < points; ++g)
     speed_[g] += piston_flow_ * to_speed_;
-    drag_[static_cast<size_t>(g)] = friction_.drag(speed_[g], speed_[stretches + g]);
-  }
+  friction_.set_drag(speed_.data(), speed_.data() + speed_.size() / 2, drag_);
   if (layer_.exists()) remember(is_settled);
   rate_by_state_.times(state_, bare_rate_);
-  rate_by_force_.add_times(bare_, bare_rate_);
+  rate_by_force_.add_times(bare_rate_, bare_, bare_rate_);
   const double carried = loads.piston_acceleration * to_speed_;
   for (int pass = 0; pass < passes; ++pass) {
     for (Index g = 0; g < points; ++g) {
-      const WallFriction::Drag& drag = drag_[static_cast<size_t>(g)];
-      gradient_[g] = drag.still_kPa_per_m + drag.by_rate * rate_[g];
-      rate_[g] = bare_rate_[g] + carried;
+      const auto place = static_cast<size_t>(g);
+      gradient_[g] = drag_.still_kPa_per_m[place] + drag_.by_rate[place] * rate_[g];
     }
-    rate_by_drag_.add_times(gradient_, rate_);
+    if (pass == 0) bare_rate_.array() += carried;
+    rate_by_drag_.add_times(bare_rate_, gradient_, rate_);
   }
-  force_ = bare_;
-  force_by_drag_.add_times(gradient_, force_);
+  force_by_drag_.add_times(bare_, gradient_, force_);
   settled_acceleration_ = loads.piston_acceleration;
 }
 
@@ -238,16 +235,14 @@ void HoseLine::begin_step(const EndLoads& now, double piston_flow_at_end) {
   for (Index i = 0; i < count_; ++i)
     force_[i] += piston_mass_[i] * other;
   flow_.times(state_, drifted_);
-  from_start_.add_times(force_, drifted_);
-  state_ = drifted_;
-  from_end_.add_times(force_, state_);
+  from_start_.add_times(drifted_, force_, drifted_);
+  from_end_.add_times(drifted_, force_, state_);
   piston_flow_ = piston_flow_at_end;
 }
 
 void HoseLine::end_step(const EndLoads& then) {
   forces(then, 2, false);
-  state_ = drifted_;
-  from_end_.add_times(force_, state_);
+  from_end_.add_times(drifted_, force_, state_);
 }
 
 double HoseLine::energy_mJ() const {

@@ -129,7 +129,7 @@ class HoseLine {
   Eigen::VectorXd pump_by_state_, pump_by_force_, by_pump_load_;
 
   Eigen::VectorXd state_, drifted_, bare_, force_, speed_, bare_rate_, rate_, gradient_;
-  std::vector<WallFriction::Drag> drag_;
+  WallFriction::Drag drag_;
   double piston_flow_ = 0.0, settled_acceleration_ = 0.0, pump_kPa_ = 0.0;
 };
 

@@ -1,21 +1,26 @@
 #include "estimator/rig/small_matrix.hpp"
 
-#include <cstring>
 #include <utility>
 
 namespace diastole::rig {
 namespace {
 
 /// Neighbouring rows as one value: compilers arrange loops over an array's elements several times worse.
-template <size_t Rows>
+template <size_t Width>
 struct Neighbours {
-  using Type __attribute__((vector_size(Rows * sizeof(double)))) = double;
+  using Type __attribute__((vector_size(Width * sizeof(double)))) = double;
 };
+
+// Not std::memcpy: where that is checked, sums do not stay in registers.
+template <class Rows>
+[[gnu::always_inline]] inline void load(Rows& rows, const double* from) {
+  __builtin_memcpy(&rows, from, sizeof rows);
+}
 
 template <class Rows>
 [[gnu::always_inline]] inline void add_column(Rows& sum, const double* column, double by) {
   Rows rows;
-  std::memcpy(&rows, column, sizeof rows);
+  load(rows, column);
   sum += rows * by;
 }
 
@@ -23,12 +28,12 @@ template <class Rows>
 /// places are constants: the sums stay in registers.
 template <size_t Width, size_t... Part>
 [[gnu::always_inline]] inline void multiply_rows(const double* values, size_t stride, size_t columns,
-                                                 const double* in, double* out, bool add,
+                                                 const double* before, const double* in, double* out,
                                                  std::index_sequence<Part...> /*parts*/) {
   using Rows = typename Neighbours<Width>::Type;
   Rows even[sizeof...(Part)] = {},
        odd[sizeof...(Part)] = {};  // NOLINT: no call must stand between them and the registers
-  if (add) (std::memcpy(&even[Part], out + Width * Part, sizeof(Rows)), ...);
+  if (before != nullptr) (load(even[Part], before + Width * Part), ...);
   size_t j = 0;
   for (; j + 2 <= columns; j += 2, values += 2 * stride) {
     (add_column(even[Part], values + Width * Part, in[j]), ...);
@@ -36,36 +41,41 @@ template <size_t Width, size_t... Part>
   }
   if (j < columns) (add_column(even[Part], values + Width * Part, in[j]), ...);
   ((even[Part] += odd[Part]), ...);
-  (std::memcpy(out + Width * Part, &even[Part], sizeof(Rows)), ...);
+  (__builtin_memcpy(out + Width * Part, &even[Part], sizeof(Rows)), ...);
+}
+
+[[gnu::always_inline]] inline const double* part_of(const double* before, size_t row) {
+  return before == nullptr ? nullptr : before + row;
 }
 
 template <size_t Width>
 [[gnu::always_inline]] inline void multiply_all(const double* values, size_t rows, size_t columns,
-                                                const double* in, double* out, bool add) {
+                                                const double* before, const double* in, double* out) {
   constexpr std::make_index_sequence<8 / Width> eight;
   constexpr std::make_index_sequence<16 / Width> sixteen;
   size_t row = 0;
   for (; row + 16 <= rows; row += 16)
-    multiply_rows<Width>(values + row, rows, columns, in, out + row, add, sixteen);
-  if (row < rows) multiply_rows<Width>(values + row, rows, columns, in, out + row, add, eight);
+    multiply_rows<Width>(values + row, rows, columns, part_of(before, row), in, out + row, sixteen);
+  if (row < rows)
+    multiply_rows<Width>(values + row, rows, columns, part_of(before, row), in, out + row, eight);
 }
 
-using Multiply = void (*)(const double*, size_t, size_t, const double*, double*, bool);
+using Multiply = void (*)(const double*, size_t, size_t, const double*, const double*, double*);
 
-void multiply_narrow(const double* values, size_t rows, size_t columns, const double* in, double* out,
-                     bool add) {
-  multiply_all<2>(values, rows, columns, in, out, add);
+void multiply_narrow(const double* values, size_t rows, size_t columns, const double* before,
+                     const double* in, double* out) {
+  multiply_all<2>(values, rows, columns, before, in, out);
 }
 
 #if defined(__x86_64__)
 [[gnu::target("avx2,fma")]] void multiply_wide(const double* values, size_t rows, size_t columns,
-                                               const double* in, double* out, bool add) {
-  multiply_all<4>(values, rows, columns, in, out, add);
+                                               const double* before, const double* in, double* out) {
+  multiply_all<4>(values, rows, columns, before, in, out);
 }
 
 [[gnu::target("avx512f")]] void multiply_widest(const double* values, size_t rows, size_t columns,
-                                                const double* in, double* out, bool add) {
-  multiply_all<8>(values, rows, columns, in, out, add);
+                                                const double* before, const double* in, double* out) {
+  multiply_all<8>(values, rows, columns, before, in, out);
 }
 
 /// For this processor.
@@ -80,15 +90,19 @@ Multiply best() { return multiply_narrow; }
 
 }  // namespace
 
-SmallMatrix::SmallMatrix(const Eigen::MatrixXd& matrix) {
-  values_.setZero(padded(matrix.rows()), matrix.cols());
-  values_.topRows(matrix.rows()) = matrix;
+SmallMatrix::SmallMatrix(const Eigen::MatrixXd& matrix)
+    : values_(static_cast<size_t>(padded(matrix.rows()) / 8 * matrix.cols())),
+      rows_(static_cast<size_t>(padded(matrix.rows()))),
+      columns_(static_cast<size_t>(matrix.cols())) {
+  for (size_t j = 0; j < columns_; ++j)
+    for (size_t i = 0; i < static_cast<size_t>(matrix.rows()); ++i)
+      values_[(j * rows_ + i) / 8].values[i % 8] =
+          matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
 }
 
-void SmallMatrix::multiply(const double* in, double* out, bool add) const {
+void SmallMatrix::multiply(const double* before, const double* in, double* out) const {
   static const Multiply product = best();
-  product(values_.data(), static_cast<size_t>(values_.rows()), static_cast<size_t>(values_.cols()), in, out,
-          add);
+  product(values_.front().values.data(), rows_, columns_, before, in, out);
 }
 
 }  // namespace diastole::rig

@@ -8,6 +8,7 @@
 #include <limits>
 #include <numbers>
 
+#include "estimator/parallel/avx2.hpp"
 #include "estimator/parallel/parallel_for.hpp"
 #include "protocol/signal/median.hpp"
 
@@ -33,6 +34,29 @@ double product(const FeatureBlock::Function& f, const FeatureBlock::Function& g)
   return f.values.segment(from - f.first, to - from)
       .cast<double>()
       .dot(g.values.segment(from - g.first, to - from).cast<double>());
+}
+
+/// Sixteen rows at a time, summed apart, so that sums do not wait for each other.
+DIASTOLE_ALSO_FOR_AVX2 double dot(const float* function, const double* series, size_t rows) {
+  using Eight __attribute__((vector_size(8 * sizeof(double)))) = double;
+  using EightFloats __attribute__((vector_size(8 * sizeof(float)))) = float;
+  Eight sums[2] = {}, values;
+  EightFloats of_function;
+  size_t k = 0;
+  for (; k + 16 <= rows; k += 16) {
+    for (const size_t half : {size_t{0}, size_t{1}}) {
+      __builtin_memcpy(&of_function, function + k + 8 * half, sizeof of_function);
+      __builtin_memcpy(&values, series + k + 8 * half, sizeof values);
+      sums[half] += __builtin_convertvector(of_function, Eight) * values;
+    }
+  }
+  sums[0] += sums[1];
+  double sum = 0.0;
+  for (int i = 0; i < 8; ++i)
+    sum += sums[0][i];
+  for (; k < rows; ++k)
+    sum += static_cast<double>(function[k]) * series[k];
+  return sum;
 }
 
 /// Functions over a window's rows, one after the other.
@@ -128,6 +152,21 @@ void add_cosines(BasisMaker& basis, double length_s) {
               [&](double x) { return std::cos(std::numbers::pi * static_cast<double>(h) * x); });
 }
 
+/// Where a cycle is a whole number of rows, of which none is missing.
+void find_cyclic(FeatureBlock& block, double rows_a_cycle) {
+  constexpr float same = 1e-6F;  // of one: floats of the same phase differ by a tenth of it
+  const auto cycle = static_cast<Eigen::Index>(std::lround(rows_a_cycle));
+  if (cycle == 0 || 2 * cycle > block.rows) return;
+  size_t count = 0;
+  while (count < block.basis.size() && block.features[count].kind == FeatureKind::repeats) {
+    const Eigen::VectorXf& values = block.basis[count++].values;
+    const Eigen::Index others = values.size() - cycle;
+    if (!((values.head(others) - values.tail(others)).cwiseAbs().maxCoeff() < same)) return;
+  }
+  block.cyclic = count;
+  block.cycle_rows = cycle;
+}
+
 double range_of(const std::vector<double>& values, size_t first, size_t last) {
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
@@ -152,6 +191,7 @@ void set_basis(FeatureBlock& block, const SessionRun& run, const std::vector<dou
     turns.push_back((run.sample_s[k] - segment.start_s) / block.period_s);
     missing.push_back(!std::isfinite(values[k]));
   }
+  const double rows_a_cycle = static_cast<double>(turns.size() - 1) / (turns.back() - turns.front());
   BasisMaker basis(block, std::move(turns), std::move(missing));
   if (block.cycles > 1.0) {
     add_cycles(basis, block.cycles, block.period_s);
@@ -159,6 +199,7 @@ void set_basis(FeatureBlock& block, const SessionRun& run, const std::vector<dou
     add_cosines(basis, block.period_s);
   }
   basis.finish();
+  if (block.cycles > 1.0) find_cyclic(block, rows_a_cycle);
 }
 
 /// Harmonics of a gated volume's frames.
@@ -310,14 +351,20 @@ SegmentFeatures::SegmentFeatures(const Session& session, const NoiseModel& noise
 
 Eigen::MatrixXd SegmentFeatures::project(const FeatureBlock& block, const Eigen::MatrixXd& values) {
   Eigen::MatrixXd products(static_cast<Eigen::Index>(block.basis.size()), values.cols());
-  Eigen::VectorXd of_rows;
+  Eigen::MatrixXd cycle = Eigen::MatrixXd::Zero(block.cycle_rows, values.cols());
+  for (Eigen::Index from = 0; block.cycle_rows > 0 && from < values.rows(); from += block.cycle_rows) {
+    const Eigen::Index rows = std::min(block.cycle_rows, values.rows() - from);
+    cycle.topRows(rows) += values.middleRows(from, rows);
+  }
   for (size_t j = 0; j < block.basis.size(); ++j) {
     const FeatureBlock::Function& function = block.basis[j];
-    of_rows = function.values.cast<double>();
+    const bool is_cyclic = j < block.cyclic;
+    const Eigen::MatrixXd& series = is_cyclic ? cycle : values;
+    const Eigen::Index rows = is_cyclic ? block.cycle_rows : function.values.size();
     // One by one: what is projected beside a series must not change its last digit.
     for (Eigen::Index m = 0; m < values.cols(); ++m)
       products(static_cast<Eigen::Index>(j), m) =
-          of_rows.dot(values.col(m).segment(function.first, of_rows.size()));
+          dot(function.values.data(), series.col(m).data() + function.first, static_cast<size_t>(rows));
   }
   for (auto column : products.colwise())
     block.factor.triangularView<Eigen::Lower>().solveInPlace(column);

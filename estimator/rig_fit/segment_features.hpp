@@ -67,6 +67,9 @@ struct FeatureBlock {
   Eigen::Index rows = 0;
   std::vector<Function> basis;
   Eigen::MatrixXd factor;  ///< lower triangle
+  // The first `cyclic` functions repeat themselves after `cycle_rows`: a series is added up over its cycles for them.
+  size_t cyclic = 0;
+  Eigen::Index cycle_rows = 0;
 };
 
 /// What the instruments show of one run.

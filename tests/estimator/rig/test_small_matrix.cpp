@@ -17,7 +17,7 @@ TEST(SmallMatrix, MultipliesAsEigenDoes) {
     EXPECT_LT((out.head(rows) - expected).norm(), 1e-13) << rows;
     EXPECT_EQ(out.tail(out.size() - rows).norm(), 0.0) << rows;
     const Eigen::VectorXd from_start = matrix * in.head(columns);
-    small.add_times(in, out);
+    small.add_times(out, in, out);
     EXPECT_LT((out.head(rows) - expected - from_start).norm(), 1e-13) << rows;
   }
 }
