@@ -8,6 +8,7 @@
 #include "host/cli/host_commands.hpp"
 #include "host/cli/session_facts.hpp"
 #include "protocol/contract/named_members.hpp"
+#include "protocol/contract/plain_text.hpp"
 #include "protocol/contract/waiting_line.hpp"
 #include "protocol/runfile/reader.hpp"
 #include "protocol/runfile/soundness.hpp"
@@ -123,22 +124,22 @@ std::string in_words(const runfile::StreamFacts& facts) {
 
 void show_channels(const runfile::RecordedRun& run, const runfile::Soundness& soundness) {
   for (const auto& [name, range] : soundness.ranges) {
-    fmt::print("    {}: {}\n", name,
-               range.any() ? fmt::format("{:.3f} to {:.3f} kPa", range.least, range.most) : "no sample");
+    print_plain("    {}: {}\n", name,
+                range.any() ? fmt::format("{:.3f} to {:.3f} kPa", range.least, range.most) : "no sample");
     if (const std::string words = calibration_words(calibration_of(run, name)); !words.empty())
-      fmt::print("      {}\n", words);
+      print_plain("      {}\n", words);
     const auto notes = run.pressure.notes.find(name);
     if (notes == run.pressure.notes.end()) continue;
     for (const auto& [note, value] : notes->second)
-      std::visit([&, key = note](const auto& v) { fmt::print("      {}: {}\n", key, v); }, value);
+      std::visit([&, key = note](const auto& v) { print_plain("      {}: {}\n", key, v); }, value);
   }
 }
 
 void show_slices(const runfile::RecordedRun& run) {
   for (size_t i = 0; i < run.slices.size(); ++i) {
     const runfile::Slice& slice = run.slices[i];
-    fmt::print("  slice {} ({} {}): {} of {} cycles, triggers {} to {}\n", i, slice.block, slice.number,
-               slice.triggers, slice.cycles, slice.first_trigger, slice.first_trigger + slice.triggers - 1);
+    print_plain("  slice {} ({} {}): {} of {} cycles, triggers {} to {}\n", i, slice.block, slice.number,
+                slice.triggers, slice.cycles, slice.first_trigger, slice.first_trigger + slice.triggers - 1);
   }
 }
 
@@ -146,36 +147,36 @@ void show_triggers(const runfile::RecordedRun& run, const runfile::Soundness& so
   const std::string holds =
       soundness.scheduled_holds > 0 ? fmt::format(" and {} of hold", soundness.scheduled_holds) : "";
   const runfile::TriggerCounts& counts = soundness.triggers;
-  fmt::print("  triggers: {} for {} cycles{}; {} missing, {} extra, {} not periodic\n", run.trigger_s.size(),
-             soundness.scheduled_cycles, holds, counts.missing, counts.extra, counts.non_periodic);
+  print_plain("  triggers: {} for {} cycles{}; {} missing, {} extra, {} not periodic\n", run.trigger_s.size(),
+              soundness.scheduled_cycles, holds, counts.missing, counts.extra, counts.non_periodic);
 }
 
 void show(const runfile::RecordedRun& run, const runfile::Soundness& soundness) {
-  fmt::print("{}\n  run {} of {}, by {}\n", run.file, run.run_id, run.started_utc, run.producer);
-  fmt::print("{}", session_words(runfile::read_session(run.file)));
+  print_plain("{}\n  run {} of {}, by {}\n", run.file, run.run_id, run.started_utc, run.producer);
+  print_plain("{}", session_words(runfile::read_session(run.file)));
   for (size_t i = 0; i < run.segments.size(); ++i) {
     const runfile::Segment& s = run.segments[i];
-    fmt::print("  segment {}: {} x {} of {:g} mL in {:g} s from {:.3f} s, offset {:g} mL{}\n", i, s.cycles,
-               s.waveform, s.stroke_mL, s.period_s, s.start_s, s.offset_mL,
-               run.flow.contains(i) ? ", with phase-contrast volumes" : "");
+    print_plain("  segment {}: {} x {} of {:g} mL in {:g} s from {:.3f} s, offset {:g} mL{}\n", i, s.cycles,
+                s.waveform, s.stroke_mL, s.period_s, s.start_s, s.offset_mL,
+                run.flow.contains(i) ? ", with phase-contrast volumes" : "");
   }
-  fmt::print("  pressure: {}\n", in_words(soundness.pressure));
+  print_plain("  pressure: {}\n", in_words(soundness.pressure));
   show_channels(run, soundness);
-  fmt::print("  pump: {}\n", in_words(soundness.pump));
+  print_plain("  pump: {}\n", in_words(soundness.pump));
   show_triggers(run, soundness);
   show_slices(run);
   for (const auto& [name, value] : run.clock)
-    fmt::print("  clock {}: {:g}\n", name, value);
+    print_plain("  clock {}: {:g}\n", name, value);
   for (const runfile::Event& event : run.events)
-    fmt::print("  {:.3f} s {} {}: {}\n", event.time_s, event.level, event.code, event.text);
+    print_plain("  {:.3f} s {} {}: {}\n", event.time_s, event.level, event.code, event.text);
   if (soundness.sound()) {
-    fmt::print("sound: nothing is missing{}\n",
-               soundness.stopped_on_request ? "; the run was stopped on request" : "");
+    print_plain("sound: nothing is missing{}\n",
+                soundness.stopped_on_request ? "; the run was stopped on request" : "");
     return;
   }
-  fmt::print("not sound:\n");
+  print_plain("not sound:\n");
   for (const std::string& problem : soundness.problems)
-    fmt::print("  {}\n", problem);
+    print_plain("  {}\n", problem);
 }
 
 }  // namespace

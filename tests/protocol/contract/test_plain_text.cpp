@@ -32,5 +32,11 @@ TEST(PlainText, RefusesWhatIsNotUtf8) {
     EXPECT_EQ(why_not_plain(text), "is not UTF-8 at byte 0");
 }
 
+TEST(PlainText, OfOthersIsPrintedSo) {
+  testing::internal::CaptureStdout();
+  print_plain("  {:.1f} s {}: {}\n", 3.0, "warning", "\x1b[31mred");
+  EXPECT_EQ(testing::internal::GetCapturedStdout(), "  3.0 s warning: \xEF\xBF\xBD[31mred\n");
+}
+
 }  // namespace
 }  // namespace diastole

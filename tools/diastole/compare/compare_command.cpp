@@ -11,6 +11,7 @@
 #include "estimator/report/page.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/json_text.hpp"
+#include "protocol/contract/plain_text.hpp"
 #include "protocol/contract/waiting_line.hpp"
 #include "protocol/runfile/reader.hpp"
 #include "tools/diastole/commands.hpp"
@@ -26,9 +27,9 @@ template <class Visit, IsRecord<Departure> Record>
 void each_member(Visit&& visit, Record& departure) {
   DIASTOLE_VISIT(visit, departure, run, offset_Pa, gain, rms_Pa, worst_Pa, worst_phase, worst_in_errors,
                  limit_in_errors, allowed_Pa, range_Pa)
-  const bool beyond_noise = departure.beyond_noise();
+  const bool beyond_noise = departure.outcome() == Outcome::differs;
   visit("beyond_noise", beyond_noise);
-  const bool undecided = departure.undecided();
+  const bool undecided = departure.outcome() == Outcome::undecided;
   visit("undecided", undecided);
 }
 
@@ -38,11 +39,12 @@ template <class Visit, IsRecord<Comparison> Record>
 void each_member(Visit&& visit, Record& comparison) {
   visit("runs", comparison.files);
   DIASTOLE_VISIT(visit, comparison, differences, overlays, remarks)
-  const bool is_tested = comparison.is_tested();
+  const std::optional<Outcome> outcome = comparison.outcome();
+  const bool is_tested = outcome.has_value();
   visit("is_tested", is_tested);
-  const bool beyond_noise = comparison.beyond_noise();
+  const bool beyond_noise = outcome == Outcome::differs;
   visit("beyond_noise", beyond_noise);
-  const bool undecided = comparison.undecided();
+  const bool undecided = outcome == Outcome::undecided;
   visit("undecided", undecided);
 }
 
@@ -51,6 +53,7 @@ void each_member(Visit&& visit, Record& comparison) {
 namespace {
 
 using comparison::Comparison;
+using comparison::Outcome;
 
 struct CompareOptions {
   std::vector<std::filesystem::path> runs;
@@ -58,6 +61,18 @@ struct CompareOptions {
   size_t parts = 40;
   bool force = false;
 };
+
+std::string_view verb_of(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::agrees:
+      return "agrees with";
+    case Outcome::differs:
+      return "differs from";
+    case Outcome::undecided:
+      break;
+  }
+  return "may agree with or differ from";
+}
 
 std::string undecided_words(const comparison::Departure& departure) {
   if (departure.allowed_Pa <= 0) return "; the noise is not known";
@@ -67,34 +82,31 @@ std::string undecided_words(const comparison::Departure& departure) {
 
 void show(const Comparison& found) {
   for (size_t i = 0; i < found.files.size(); ++i)
-    fmt::print("[{}] {}\n", i, found.files[i]);
+    print_plain("[{}] {}\n", i, found.files[i]);
   std::string group;
   for (const comparison::Difference& difference : found.differences) {
-    if (difference.group != group) fmt::print("{}\n", group = difference.group);
-    fmt::print("  {:28}", difference.place);
+    if (difference.group != group) print_plain("{}\n", group = difference.group);
+    print_plain("  {:28}", difference.place);
     for (const std::string& value : difference.values)
-      fmt::print("  {}", value.empty() ? "-" : value);
-    fmt::print("\n");
+      print_plain("  {}", value.empty() ? "-" : value);
+    print_plain("\n");
   }
-  if (found.differences.empty()) fmt::print("session, protocol, rig and calibration are the same\n");
+  if (found.differences.empty()) print_plain("session, protocol, rig and calibration are the same\n");
   for (const comparison::Overlay& overlay : found.overlays) {
     for (const comparison::Departure& departure : overlay.departures) {
-      fmt::print(
+      print_plain(
           "segment {} {}: [{}] {} [0]: offset {} Pa, gain {}, rms {} Pa; worst {} Pa at phase {:.2f}, {} "
           "errors of {} allowed{}\n",
-          overlay.segment, overlay.channel, departure.run,
-          departure.undecided()      ? "may agree with or differ from"
-          : departure.beyond_noise() ? "differs from"
-                                     : "agrees with",
+          overlay.segment, overlay.channel, departure.run, verb_of(departure.outcome()),
           report::number(departure.offset_Pa, 3), report::number(departure.gain, 5),
           report::number(departure.rms_Pa, 3), report::number(departure.worst_Pa, 3), departure.worst_phase,
           report::number(departure.worst_in_errors, 3), report::number(departure.limit_in_errors, 3),
-          departure.undecided() ? undecided_words(departure) : "");
+          departure.outcome() == Outcome::undecided ? undecided_words(departure) : "");
     }
   }
-  if (!found.is_tested()) fmt::print("no pressure could be tested against noise\n");
+  if (!found.outcome()) print_plain("no pressure could be tested against noise\n");
   for (const std::string& remark : found.remarks)
-    fmt::print("{}\n", remark);
+    print_plain("{}\n", remark);
 }
 
 ExitCode compare_runs(const CompareOptions& options, const CommandOutput& out) {

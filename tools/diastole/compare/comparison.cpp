@@ -197,20 +197,17 @@ bool can_be_tested(const Overlay& overlay, const MeanCycle& cycle, const std::ve
 
 }  // namespace
 
-bool Comparison::is_tested() const {
-  return std::ranges::any_of(overlays, [](const Overlay& overlay) { return !overlay.departures.empty(); });
+size_t Comparison::count(Outcome outcome) const {
+  size_t count = 0;
+  for (const Overlay& overlay : overlays)
+    count += static_cast<size_t>(std::ranges::count(overlay.departures, outcome, &Departure::outcome));
+  return count;
 }
 
-bool Comparison::beyond_noise() const {
-  return std::ranges::any_of(overlays, [](const Overlay& overlay) {
-    return std::ranges::any_of(overlay.departures, &Departure::beyond_noise);
-  });
-}
-
-bool Comparison::undecided() const {
-  return std::ranges::any_of(overlays, [](const Overlay& overlay) {
-    return std::ranges::any_of(overlay.departures, &Departure::undecided);
-  });
+std::optional<Outcome> Comparison::outcome() const {
+  for (const Outcome outcome : {Outcome::differs, Outcome::agrees, Outcome::undecided})
+    if (count(outcome) > 0) return outcome;
+  return {};
 }
 
 Comparison compare(const std::vector<RunFile>& runs, const std::vector<runfile::Session>& sessions,

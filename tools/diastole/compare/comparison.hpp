@@ -36,6 +36,12 @@ struct MeanCycle {
   std::vector<double> error_kPa;  ///< of the mean
 };
 
+enum class Outcome {
+  agrees,
+  differs,
+  undecided  ///< the noise is not known, or is large beside the trace
+};
+
 /// A run's mean cycle against the first run's.
 struct Departure {
   size_t run = 0;
@@ -48,11 +54,10 @@ struct Departure {
   double limit_in_errors = 0;  ///< beyond it, it is no noise
   double allowed_Pa = 0;       ///< the largest difference in any part that may be noise
   double range_Pa = 0;         ///< of the mean cycle that has less
-  [[nodiscard]] bool beyond_noise() const { return worst_in_errors > limit_in_errors; }
-  /// Neither: the noise is not known, or is large beside the trace.
-  [[nodiscard]] bool undecided() const {
+  [[nodiscard]] Outcome outcome() const {
     constexpr double most_of_range = 0.1;
-    return !beyond_noise() && !(allowed_Pa > 0 && allowed_Pa <= most_of_range * range_Pa);
+    if (worst_in_errors > limit_in_errors) return Outcome::differs;
+    return allowed_Pa > 0 && allowed_Pa <= most_of_range * range_Pa ? Outcome::agrees : Outcome::undecided;
   }
 };
 
@@ -71,9 +76,10 @@ struct Comparison {
   std::vector<Overlay> overlays;
   std::vector<std::string> remarks;  ///< what is not sound, was left out or could not be compared, and why
 
-  [[nodiscard]] bool is_tested() const;  ///< any pressure against noise
-  [[nodiscard]] bool beyond_noise() const;
-  [[nodiscard]] bool undecided() const;  ///< in any segment and channel
+  /// In how many segments and channels pressure against noise ends so.
+  [[nodiscard]] size_t count(Outcome outcome) const;
+  /// Differs if any does, agrees if any does: a trace that stands still says nothing of the others. None if there is no pressure to test.
+  [[nodiscard]] std::optional<Outcome> outcome() const;
 };
 
 /// `sessions` of the same runs; `parts` of the period. Precondition: two or more runs.

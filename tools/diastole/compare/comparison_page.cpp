@@ -61,21 +61,29 @@ report::Figure differences(const Comparison& comparison, const Overlay& overlay)
           "A line that leaves its band around zero differs from the first run by more than noise."};
 }
 
+void add_outcome(report::Page& page, const Comparison& comparison) {
+  const size_t undecided = comparison.count(Outcome::undecided);
+  const auto outcome = comparison.outcome();
+  if (!outcome) {
+    page.headline("traces", "not tested", "no motion that two runs share with noise that is known");
+  } else if (outcome == Outcome::differs) {
+    page.headline("traces", "differ", "by more than noise");
+  } else if (outcome == Outcome::undecided) {
+    page.headline("traces", "may agree or differ", "noise is large beside the trace");
+  } else {
+    page.headline("traces", "agree",
+                  undecided == 0
+                      ? "within their noise"
+                      : fmt::format("within their noise; in {} of {} noise is large beside the trace",
+                                    undecided, undecided + comparison.count(Outcome::agrees)));
+  }
+}
+
 }  // namespace
 
 std::string comparison_page(const Comparison& comparison) {
   report::Page page("Runs compared");
-  if (!comparison.is_tested()) {
-    page.headline("traces", "not tested", "no motion that two runs share with noise that is known");
-  } else {
-    page.headline("traces",
-                  comparison.beyond_noise() ? "differ"
-                  : comparison.undecided()  ? "may agree or differ"
-                                            : "agree",
-                  comparison.beyond_noise() ? "by more than noise"
-                  : comparison.undecided()  ? "noise is large beside the trace"
-                                            : "within their noise");
-  }
+  add_outcome(page, comparison);
   page.headline("runs", fmt::format("{}", comparison.files.size()), "each against the first");
   page.headline("settings and facts", fmt::format("{}", comparison.differences.size()),
                 "that are not the same in all");
@@ -114,9 +122,9 @@ std::string comparison_page(const Comparison& comparison) {
                                    number(departure.worst_in_errors, 3),
                                    number(departure.limit_in_errors, 3),
                                    number(departure.allowed_Pa, 3),
-                                   departure.undecided()      ? "may agree or differ"
-                                   : departure.beyond_noise() ? "differs"
-                                                              : "agrees"};
+                                   departure.outcome() == Outcome::differs  ? "differs"
+                                   : departure.outcome() == Outcome::agrees ? "agrees"
+                                                                            : "may agree or differ"};
         },
         "The limit is Student's t for the cycles at hand; equal runs pass it once in a hundred comparisons. "
         "Where noise allows more than a tenth of the trace's range, runs may differ without its being seen.");
