@@ -386,7 +386,8 @@ Learning learn_term(const rig::SessionProblem& problem, const EffectSet& set, co
     return {{}, fmt::format("the best, {} by {}, {}", best.law->sets, best.law->of, lacks)};
   std::vector<const LawCandidate*> equals;
   for (const LawCandidate& law : laws)
-    if (&law == &best || law.gain > best.gain - as_good) equals.push_back(&law);
+    if (&law == &best || (law.gain > best.gain - as_good && inference::is_settled(law.termination)))
+      equals.push_back(&law);
   LearnedTerm term = read_term(problem, equals, 0);
   for (size_t i = 1; i < equals.size(); ++i) {
     LearnedTerm other = read_term(problem, equals, i);
