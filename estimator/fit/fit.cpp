@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
+#include <set>
 
 #include "estimator/fit/fit_errors.hpp"
 #include "estimator/fit/usable_points.hpp"
@@ -36,20 +38,28 @@ bool any_by_evidence(const FitOptions& options) {
                      [](const SmoothRegion& region) { return !region.step; });
 }
 
-/// Gives each block the step of greatest evidence; whether one changed.
-bool choose_smoothness(JointProblem& problem, const Eigen::VectorXd& q, const FitOptions& options) {
+using Steps = std::vector<double>;
+
+Steps steps_of(const std::vector<SmoothBlock>& blocks) {
+  Steps steps;
+  std::ranges::transform(blocks, std::back_inserter(steps), &SmoothBlock::step);
+  return steps;
+}
+
+/// Gives each block the step of greatest evidence; whether one changed. Steps of `before`, with which searches on the same points and loss
+/// ended elsewhere, do not count: two neighbours on the grid may each speak for the other, and fit alike.
+bool choose_smoothness(JointProblem& problem, const Eigen::VectorXd& q, const FitOptions& options,
+                       std::set<Steps>& before) {
   if (!any_by_evidence(options) || !problem.residuals(q)) return false;
   const QuadraticModel model = quadratic_model(problem, q);
   std::vector<SmoothBlock> blocks = problem.smoothness();
-  bool changed = false;
-  for (size_t i = 0; i < blocks.size(); ++i) {
-    if (options.smooth[i].step) continue;
-    const double step = evidence_of_step(model, blocks, i, problem.space().free_unknowns(q)).step;
-    changed = changed || step != blocks[i].step;
-    blocks[i].step = step;
-  }
-  if (changed) problem.set_smoothness(std::move(blocks));
-  return changed;
+  before.insert(steps_of(blocks));
+  for (size_t i = 0; i < blocks.size(); ++i)
+    if (!options.smooth[i].step)
+      blocks[i].step = evidence_of_step(model, blocks, i, problem.space().free_unknowns(q)).step;
+  if (before.contains(steps_of(blocks))) return false;
+  problem.set_smoothness(std::move(blocks));
+  return true;
 }
 
 /// Whether a better loss was chosen: robust where wild points ask for it, with the scale that the residuals have.
@@ -98,11 +108,14 @@ void search_from(JointProblem& problem, Eigen::VectorXd& q, FitOutcome& outcome,
 
 /// What a search rests on beside the unknowns: which points lie on the body depends on the motion, how smooth the values are and how wild
 /// residuals are on the data. Chosen anew at q; returns whether something is other than it was, nothing where the model has no solution.
-std::optional<bool> choose_anew(JointProblem& problem, const Eigen::VectorXd& q, const FitOptions& options) {
+std::optional<bool> choose_anew(JointProblem& problem, const Eigen::VectorXd& q, const FitOptions& options,
+                                std::set<Steps>& steps_before) {
   const std::optional<size_t> gained = problem.find_points(q);
   if (!gained) return {};
-  const bool other_smoothness = choose_smoothness(problem, q, options);
+  if (*gained > 0) steps_before.clear();
+  const bool other_smoothness = choose_smoothness(problem, q, options, steps_before);
   const bool other_loss = problem.residuals(q) && choose_loss(problem, options);
+  if (other_loss) steps_before.clear();
   return *gained > 0 || other_smoothness || other_loss;
 }
 
@@ -118,6 +131,7 @@ void search_until_same(JointProblem& problem, Eigen::VectorXd& q, FitOutcome& ou
     return conclude(outcome, Termination::no_solution, "Failed: " + problem.failure() + ".");
   require_any_usable(problem, options.file);
   const bool prepares = any_by_evidence(options);  // the first search, for the choice of the smoothness
+  std::set<Steps> steps_before;
   for (int search = 1;; ++search) {
     search_from(problem, q, outcome, options, search == 1 && prepares);
     const bool stalled = outcome.termination == Termination::stalled;
@@ -125,7 +139,7 @@ void search_until_same(JointProblem& problem, Eigen::VectorXd& q, FitOutcome& ou
     // Tags that come and go from trial to trial make the cost jump: without them it goes on. So do wild ones that change
     // sides: under a loss that hardly feels them it goes on, too, if the residuals ask for one.
     const bool lost = stalled && problem.give_up_lost() > 0;
-    const std::optional<bool> is_other = choose_anew(problem, q, options);
+    const std::optional<bool> is_other = choose_anew(problem, q, options, steps_before);
     if (!is_other) return conclude(outcome, Termination::no_solution, "Failed: " + problem.failure() + ".");
     if (!*is_other && !lost && !(search == 1 && prepares)) return;
     if (search == options.most_searches)
