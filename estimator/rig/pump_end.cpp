@@ -21,18 +21,21 @@ constexpr double drive_damping_s = 2e-3;
 /// Gas that is less rings against the fluid's end faster than anybody can see, and is as well damped by friction as the drive.
 constexpr double least_undamped_gas_mL = 0.05;
 
-/// Where a function is zero that grows, from 0 outwards. Regula falsi (Illinois).
+/// Where a function is zero that grows by `slope` or more (or by less: then it takes longer), from `near` on. Regula falsi (Illinois).
 template <class Function>
-double root_of(const Function& function, double close) {
-  double a = 0.0;
+double root_of(const Function& function, double near, double slope, double close) {
+  double a = near;
   double at_a = function(a);
-  double b = at_a > 0.0 ? -1.0 : 1.0;
+  if (!std::isfinite(at_a)) at_a = function(a = 0.0);
+  if (std::abs(at_a) <= close) return a;
+  double reach = -at_a / slope;
+  double b = a + reach;
   double at_b = function(b);
   constexpr int most_steps = 60;
   for (int step = 0; step < most_steps && at_a * at_b > 0.0; ++step) {
     a = b;
     at_a = at_b;
-    at_b = function(b *= 2.0);
+    at_b = function(b += reach *= 2.0);
   }
   for (int step = 0; step < most_steps && !std::isfinite(at_b); ++step) {
     const double middle = 0.5 * (a + b);
@@ -102,7 +105,8 @@ double PumpEnd::absorbed_mL(double yielded_mL, double yielding_mL_per_s) const {
   return springs_ ? -yielded_mL - damping_s_ * yielding_mL_per_s : -yielding_mL_per_s;
 }
 
-double PumpEnd::pressure_kPa(double absorbed_mL, double beside_mL_per_kPa, double time_s) const {
+double PumpEnd::pressure_kPa(double absorbed_mL, double beside_mL_per_kPa, double near_kPa,
+                             double time_s) const {
   const bool has_gas = springs_ && gas_.present();
   const double compliance =
       (springs_ ? compliance_mL_per_kPa_ : 0.0) + leaking_s_ * conductance_mL_s_kPa_ + beside_mL_per_kPa;
@@ -113,13 +117,13 @@ double PumpEnd::pressure_kPa(double absorbed_mL, double beside_mL_per_kPa, doubl
         return compliance * pressure_kPa + (has_gas ? gas_.squeezed_mL(pressure_kPa) : 0.0) +
                leaking_s_ * leaks_beyond(pressure_kPa, time_s) - absorbed_mL;
       },
-      close * (std::abs(absorbed_mL) + 1e-9));
+      near_kPa, compliance, close * (std::abs(absorbed_mL) + 1e-9));
 }
 
 double PumpEnd::load_kPa(double yielded_mL, double yielding_mL_per_s, double time_s) const {
   if (linear_ == 0.0) return 0.0;
   const double absorbed = absorbed_mL(yielded_mL, yielding_mL_per_s);
-  return pressure_kPa(absorbed - leaked_mL_, 0.0, time_s) - absorbed / linear_;
+  return pressure_kPa(absorbed - leaked_mL_, 0.0, 0.0, time_s) - absorbed / linear_;
 }
 
 double PumpEnd::missing_load_kPa(double yielded_mL, double yielding_mL_per_s, double load_kPa,
@@ -130,7 +134,7 @@ double PumpEnd::missing_load_kPa(double yielded_mL, double yielding_mL_per_s, do
   const double part = 1.0 - given / linear_;
   const double without = (absorbed + given * load_kPa) / part;
   const double beside = given / part;
-  const double pressure = pressure_kPa(without - leaked_mL_, beside, time_s);
+  const double pressure = pressure_kPa(without - leaked_mL_, beside, load_kPa + absorbed / linear_, time_s);
   return pressure - (without - beside * pressure) / linear_ - load_kPa;
 }
 

@@ -45,8 +45,9 @@ class PumpEnd {
   [[nodiscard]] double leaks_beyond(double pressure_kPa, double time_s) const;
   /// What drive, gas and leaks have taken with their friction; of a rigid end by the second.
   [[nodiscard]] double absorbed_mL(double yielded_mL, double yielding_mL_per_s) const;
-  /// The pressure at which they, and what gives way beside them, have taken this volume.
-  [[nodiscard]] double pressure_kPa(double absorbed_mL, double beside_mL_per_kPa, double time_s) const;
+  /// The pressure at which they, and what gives way beside them, have taken this volume; of several the one that is found from `near_kPa`.
+  [[nodiscard]] double pressure_kPa(double absorbed_mL, double beside_mL_per_kPa, double near_kPa,
+                                    double time_s) const;
 
   double step_s_;
   double compliance_mL_per_kPa_;  ///< of the drive

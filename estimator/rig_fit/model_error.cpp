@@ -163,7 +163,7 @@ EvidenceFit fit_linear(const VectorXd& z, const Eigen::MatrixXd& columns, const 
 
 EvidenceFit fit_with_shares(const VectorXd& z, const Eigen::MatrixXd& columns, const ModelError& error,
                             const Shares& start) {
-  constexpr int most_steps = 40;
+  constexpr int most_steps = 200;  // some forty where a rig without its effect errs by a tenth of the range
   constexpr double longest = 1.0;  // of a logarithm in a step
   constexpr double small = 0.01;   // nats, far below what decides anything
   Shares shares = start;

@@ -236,6 +236,7 @@ void SetSearch::fit_best_again(size_t effects) {
       break;
     if (const auto posterior = posterior_by_part(set, sets_, responses_)) {
       set.log_posterior = *posterior;
+      set.by_part = true;
     } else {
       set = fit_set_exactly(problem_, set);
     }

@@ -47,6 +47,8 @@ struct EffectSet {
   Eigen::MatrixXd columns;  ///< of the evidence's linear unknowns: the effects', then the nuisances
   double log_posterior = 0.0;  ///< evidence and prior
   bool exact = false;          ///< its tolerances were simulated
+  bool by_part =
+      false;  ///< its posterior, not its evidence, has what a part of it gained by being fitted exactly
   inference::Termination termination = inference::Termination::no_solution;
 
   [[nodiscard]] std::vector<std::string> ids() const;  ///< sorted

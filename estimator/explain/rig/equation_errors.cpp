@@ -1,8 +1,11 @@
 #include "estimator/explain/rig/equation_errors.hpp"
 
 #include <cmath>
+#include <limits>
 #include <map>
 #include <tuple>
+
+#include "estimator/explain/rig/set_fit.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -53,11 +56,13 @@ double log_odds_beside_equation_errors(const rig::SessionProblem& problem, const
     repeated.conservativeResize(Eigen::NoChange, repeated.cols() + errors.cols());
     repeated.rightCols(errors.cols()) = errors;
   }
-  const auto log_posterior = [&](const EffectSet& of) {
+  const auto log_posterior = [&](const EffectSet& fitted) {
+    const EffectSet of = fitted.by_part ? fit_set_exactly(problem, fitted) : fitted;
     MatrixXd columns(changes.rows(), of.columns.cols() + repeated.cols());
     columns << of.columns, repeated;
-    return of.log_posterior - of.evidence.log_evidence +
-           fit_with_shares(of.target(), columns, error, of.evidence.shares).log_evidence;
+    const rig::EvidenceFit fit = fit_with_shares(of.target(), columns, error, of.evidence.shares);
+    if (!inference::is_settled(fit.termination)) return std::numeric_limits<double>::quiet_NaN();
+    return of.log_posterior - of.evidence.log_evidence + fit.log_evidence;
   };
   return log_posterior(set) - log_posterior(without);
 }

@@ -14,7 +14,7 @@
 namespace diastole::explain {
 
 /// ln of the odds of a set against the one without one of its effects where the equations of the others err so. `changes`: what each of
-/// the set's effects changes of the features, a column each.
+/// the set's effects changes of the features, a column each. Not a number if a fit that it needs does not settle.
 double log_odds_beside_equation_errors(const rig::SessionProblem& problem, const EffectSet& set,
                                        const EffectSet& without, const Eigen::MatrixXd& changes,
                                        size_t effect);

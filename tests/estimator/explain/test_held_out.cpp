@@ -77,7 +77,7 @@ TEST_F(HeldOut, AFoldWhoseSearchDidNotSettleIsReported) {
   record(3);
   EXPECT_EQ(held_out_gain(*problem_, plain_, plain_).termination, inference::Termination::converged);
   EffectSet far = plain_;
-  far.evidence.shares.fill(1e30);  // of the model's error: farther than a search for it goes
+  far.evidence.shares.fill(1e100);  // of the model's error: farther than a search for it goes
   EXPECT_EQ(held_out_gain(*problem_, far, plain_).termination, inference::Termination::iteration_limit);
 }
 

@@ -65,6 +65,7 @@ TEST(EquationErrors, TakeTheGainOfWhatActsWhereALargerEffectDoes) {
   const rig::SessionProblem problem(session, family, 2);
   EffectSet set = search_sets(problem).sets.back();
   set.model.terms = {{find_effect("cannula-leak-cavity"), {}}, {find_effect("sensor-drift"), {}}};
+  set.by_part = false;  // its evidence is set below
   const Eigen::MatrixXd nuisances = set.columns.rightCols(set.model.nuisances.size());
   const Eigen::VectorXd of_nuisances = set.evidence.estimate.tail(nuisances.cols());
   set.columns = Eigen::MatrixXd::Zero(nuisances.rows(), nuisances.cols() + 2);

@@ -124,7 +124,7 @@ TEST_F(SimulatedSession, WithALeakIsNotNamedBesideALikelySetWhoseSearchDidNotSet
 TEST_F(SimulatedSession, WithALeakIsNotNamedIfTheSearchOfAFoldDidNotSettle) {
   search({.terms = {{find_effect("cannula-leak-cavity"), {}}}, .values = {0.15}, .seed = 5});
   ASSERT_EQ(verdict_.verdict, Verdict::named);
-  found_.sets[verdict_.plain].evidence.shares.fill(1e30);  // farther than a search for them goes
+  found_.sets[verdict_.plain].evidence.shares.fill(1e100);  // farther than a search for them goes
   const SetVerdict unsettled = judge_sets(*problem_, found_, {});
   EXPECT_EQ(unsettled.verdict, Verdict::unexplained);
   EXPECT_EQ(unsettled.searches.back().termination, inference::Termination::iteration_limit);

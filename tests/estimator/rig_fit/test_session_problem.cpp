@@ -53,6 +53,28 @@ TEST(SegmentFeatures, KeepTheSquaresOfWhatTheirFunctionsHold) {
   EXPECT_NEAR(SegmentFeatures::project(block, wave).squaredNorm() / wave.squaredNorm(), 1.0, 1e-3);
 }
 
+// Of any series, whether its cycles are added up first or not.
+TEST(SegmentFeatures, AreTheProductsWithTheirFunctions) {
+  const SpecimenFamily family = gel_family();
+  const Session session = simulated_session(family, {});
+  const SegmentFeatures features(session, estimate_noise(session), 1);
+  size_t cyclic = 0;
+  for (const FeatureBlock& block : features.blocks()) {
+    const VectorXd series = VectorXd::Random(block.rows);
+    VectorXd expected(static_cast<Index>(block.basis.size()));
+    for (size_t j = 0; j < block.basis.size(); ++j) {
+      const FeatureBlock::Function& function = block.basis[j];
+      expected[static_cast<Index>(j)] =
+          function.values.cast<double>().dot(series.segment(function.first, function.values.size()));
+    }
+    block.factor.triangularView<Eigen::Lower>().solveInPlace(expected);
+    EXPECT_LT((SegmentFeatures::project(block, series) - expected).norm(), 1e-6 * series.norm()) << block.key;
+    cyclic += block.cyclic > 0 ? 1 : 0;
+  }
+  EXPECT_GT(cyclic, 0);
+  EXPECT_LT(cyclic, features.blocks().size());
+}
+
 /// Features that are noise and a model's error of this share, in both groups of the cavity.
 VectorXd errors_of(const ModelError& error, double share, unsigned seed) {
   std::mt19937 generator(seed);
@@ -83,7 +105,7 @@ TEST(ModelError, ASearchOfItsSharesThatEndsTooEarlyReportsThat) {
   const ModelError error = model_error_of(SegmentFeatures(session, estimate_noise(session), 1));
   const Eigen::MatrixXd none(error.noise.size(), 0);
   Shares far{};
-  far.fill(1e30);  // more than forty steps of a factor of e away
+  far.fill(1e100);  // more than two hundred steps of a factor of e away
   VectorXd z = errors_of(error, 0.005, 7);
   EXPECT_EQ(fit_with_shares(z, none, error, far).termination, inference::Termination::iteration_limit);
   z[0] = std::numeric_limits<double>::quiet_NaN();
