@@ -139,6 +139,7 @@ void search_until_same(JointProblem& problem, Eigen::VectorXd& q, FitOutcome& ou
     // Tags that come and go from trial to trial make the cost jump: without them it goes on. So do wild ones that change
     // sides: under a loss that hardly feels them it goes on, too, if the residuals ask for one.
     const bool lost = stalled && problem.give_up_lost() > 0;
+    if (stalled) steps_before.clear();
     const std::optional<bool> is_other = choose_anew(problem, q, options, steps_before);
     if (!is_other) return conclude(outcome, Termination::no_solution, "Failed: " + problem.failure() + ".");
     if (!*is_other && !lost && !(search == 1 && prepares)) return;

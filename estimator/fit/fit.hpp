@@ -44,8 +44,8 @@ enum class Robustness {
 struct FitOptions {
   std::string file;                 ///< named in errors
   inference::SearchOptions search;  ///< its on_step is not used
-  /// Searches follow one another as long as where one ended other points lie on the body, or another smoothness or loss fits: one to three
-  /// as a rule. So many at most.
+  /// Searches follow one another as long as where one ended other points lie on the body, or another smoothness (than in
+  /// any search before) or loss fits: one to three as a rule. So many at most.
   int most_searches = 8;
   LocatorOptions locator;  ///< how far outside the body a point may lie
   std::vector<SmoothRegion> smooth;

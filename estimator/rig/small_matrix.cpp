@@ -102,7 +102,7 @@ SmallMatrix::SmallMatrix(const Eigen::MatrixXd& matrix)
 
 void SmallMatrix::multiply(const double* before, const double* in, double* out) const {
   static const Multiply product = best();
-  product(values_.front().values.data(), rows_, columns_, before, in, out);
+  product(reinterpret_cast<const double*>(values_.data()), rows_, columns_, before, in, out);
 }
 
 }  // namespace diastole::rig

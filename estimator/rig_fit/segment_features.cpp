@@ -155,13 +155,16 @@ void add_cosines(BasisMaker& basis, double length_s) {
 /// Where a cycle is a whole number of rows, of which none is missing.
 void find_cyclic(FeatureBlock& block, double rows_a_cycle) {
   constexpr float same = 1e-6F;  // of one: floats of the same phase differ by a tenth of it
-  const auto cycle = static_cast<Eigen::Index>(std::lround(rows_a_cycle));
-  if (cycle == 0 || 2 * cycle > block.rows) return;
+  const double rounded = std::round(rows_a_cycle);
+  if (!(rounded >= 1.0 && 2.0 * rounded <= static_cast<double>(block.rows))) return;
+  const auto cycle = static_cast<Eigen::Index>(rounded);
   size_t count = 0;
   while (count < block.basis.size() && block.features[count].kind == FeatureKind::repeats) {
     const Eigen::VectorXf& values = block.basis[count++].values;
-    const Eigen::Index others = values.size() - cycle;
-    if (!((values.head(others) - values.tail(others)).cwiseAbs().maxCoeff() < same)) return;
+    for (Eigen::Index from = cycle; from < values.size(); from += cycle) {
+      const Eigen::Index rows = std::min(cycle, values.size() - from);
+      if (!((values.segment(from, rows) - values.head(rows)).cwiseAbs().maxCoeff() < same)) return;
+    }
   }
   block.cyclic = count;
   block.cycle_rows = cycle;

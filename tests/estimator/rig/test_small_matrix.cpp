@@ -19,6 +19,9 @@ TEST(SmallMatrix, MultipliesAsEigenDoes) {
     const Eigen::VectorXd from_start = matrix * in.head(columns);
     small.add_times(out, in, out);
     EXPECT_LT((out.head(rows) - expected - from_start).norm(), 1e-13) << rows;
+    Eigen::VectorXd beside = Eigen::VectorXd::Constant(out.size(), 7.0);
+    small.add_times(out, in, beside);
+    EXPECT_LT((beside.head(rows) - expected - 2.0 * from_start).norm(), 1e-13) << rows;
   }
 }
 

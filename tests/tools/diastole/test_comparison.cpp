@@ -127,6 +127,7 @@ TEST(RunComparison, NoiseThatIsLargeBesideTheTraceDecidesNothing) {
   EXPECT_NEAR(found.overlays.front().departures.front().allowed_Pa, 5000, 500);
   EXPECT_THAT(comparison_page(found), HasSubstr("may agree or differ"));
   EXPECT_EQ(compared({recorded(1), recorded(2)}).outcome(), Outcome::agrees);
+  EXPECT_EQ(compared({recorded(1), recorded(2), scattered}).outcome(), Outcome::undecided);
 }
 
 TEST(RunComparison, AChannelThatStandsStillSaysNothingOfTheOthers) {
@@ -139,7 +140,7 @@ TEST(RunComparison, AChannelThatStandsStillSaysNothingOfTheOthers) {
   const Comparison found = compared(runs);
   EXPECT_EQ(found.count(Outcome::undecided), 1);
   EXPECT_EQ(found.outcome(), Outcome::agrees);
-  EXPECT_THAT(comparison_page(found), HasSubstr("in 1 of 2 noise is large beside the trace"));
+  EXPECT_THAT(comparison_page(found), HasSubstr("in 1 of 2 traces it is not known or large"));
 }
 
 TEST(RunComparison, ReportsWhatIsNotSound) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <set>
 
@@ -205,8 +206,19 @@ size_t Comparison::count(Outcome outcome) const {
 }
 
 std::optional<Outcome> Comparison::outcome() const {
-  for (const Outcome outcome : {Outcome::differs, Outcome::agrees, Outcome::undecided})
-    if (count(outcome) > 0) return outcome;
+  std::map<size_t, Outcome> of_run;
+  for (const Overlay& overlay : overlays) {
+    for (const Departure& departure : overlay.departures) {
+      Outcome& outcome = of_run.try_emplace(departure.run, Outcome::undecided).first->second;
+      if (outcome != Outcome::differs && departure.outcome() != Outcome::undecided)
+        outcome = departure.outcome();
+    }
+  }
+  const auto any = [&](Outcome outcome) {
+    return std::ranges::any_of(of_run, [&](const auto& run) { return run.second == outcome; });
+  };
+  for (const Outcome outcome : {Outcome::differs, Outcome::undecided, Outcome::agrees})
+    if (any(outcome)) return outcome;
   return {};
 }
 

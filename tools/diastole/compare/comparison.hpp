@@ -78,7 +78,8 @@ struct Comparison {
 
   /// In how many segments and channels pressure against noise ends so.
   [[nodiscard]] size_t count(Outcome outcome) const;
-  /// Differs if any does, agrees if any does: a trace that stands still says nothing of the others. None if there is no pressure to test.
+  /// A run differs if any of its traces does, and agrees if any does: one that stands still says nothing of the others. All agree where
+  /// each run does. None if there is no pressure to test.
   [[nodiscard]] std::optional<Outcome> outcome() const;
 };
 

@@ -69,12 +69,12 @@ void add_outcome(report::Page& page, const Comparison& comparison) {
   } else if (outcome == Outcome::differs) {
     page.headline("traces", "differ", "by more than noise");
   } else if (outcome == Outcome::undecided) {
-    page.headline("traces", "may agree or differ", "noise is large beside the trace");
+    page.headline("traces", "may agree or differ", "noise is not known or large beside the trace");
   } else {
     page.headline("traces", "agree",
                   undecided == 0
                       ? "within their noise"
-                      : fmt::format("within their noise; in {} of {} noise is large beside the trace",
+                      : fmt::format("within their noise; in {} of {} traces it is not known or large",
                                     undecided, undecided + comparison.count(Outcome::agrees)));
   }
 }
