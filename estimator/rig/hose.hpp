@@ -54,9 +54,8 @@ class WallFriction {
   /// The gradient at several places as it depends on dv/dt: still + by_rate dv/dt.
   struct Drag {
     std::vector<double> still_kPa_per_m;
-    std::vector<double> by_rate;  ///< kPa s^2/m^2
-    std::vector<double>
-        forgetting;  ///< 1/s: how much faster turbulence wipes out the boundary layer's memory
+    std::vector<double> by_rate;     ///< kPa s^2/m^2
+    std::vector<double> forgetting;  ///< 1/s: how much faster turbulence wipes the layer's memory out
 
     void resize(size_t places);
   };

@@ -47,8 +47,7 @@ struct EffectSet {
   Eigen::MatrixXd columns;  ///< of the evidence's linear unknowns: the effects', then the nuisances
   double log_posterior = 0.0;  ///< evidence and prior
   bool exact = false;          ///< its tolerances were simulated
-  bool by_part =
-      false;  ///< its posterior, not its evidence, has what a part of it gained by being fitted exactly
+  bool by_part = false;        ///< what a part gained by being fitted exactly is in its posterior alone
   inference::Termination termination = inference::Termination::no_solution;
 
   [[nodiscard]] std::vector<std::string> ids() const;  ///< sorted

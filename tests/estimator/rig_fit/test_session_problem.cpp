@@ -105,6 +105,9 @@ TEST(ModelError, ASearchOfItsSharesThatEndsTooEarlyReportsThat) {
   const ModelError error = model_error_of(SegmentFeatures(session, estimate_noise(session), 1));
   const Eigen::MatrixXd none(error.noise.size(), 0);
   Shares far{};
+  far.fill(1e20);  // fifty steps, as a rig takes whose leak a model does not have
+  EXPECT_EQ(fit_with_shares(errors_of(error, 0.005, 7), none, error, far).termination,
+            inference::Termination::converged);
   far.fill(1e100);  // more than two hundred steps of a factor of e away
   VectorXd z = errors_of(error, 0.005, 7);
   EXPECT_EQ(fit_with_shares(z, none, error, far).termination, inference::Termination::iteration_limit);

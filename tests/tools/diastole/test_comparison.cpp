@@ -143,6 +143,15 @@ TEST(RunComparison, AChannelThatStandsStillSaysNothingOfTheOthers) {
   EXPECT_THAT(comparison_page(found), HasSubstr("in 1 of 2 traces it is not known or large"));
 }
 
+TEST(RunComparison, OneRecordingNamedTwiceIsSaidToBeOne) {
+  RecordedRun run = recorded(1), copied = recorded(1), other = recorded(2);
+  run.run_id = copied.run_id = "a";
+  other.run_id = "b";
+  EXPECT_THAT(compared({run, other, copied}).remarks,
+              testing::ElementsAre(HasSubstr("run-1.run.h5 is the recording of [0] once more")));
+  EXPECT_THAT(compared({recorded(1), recorded(1)}).remarks, IsEmpty()) << "without an id nobody knows";
+}
+
 TEST(RunComparison, ReportsWhatIsNotSound) {
   RecordedRun unsound = recorded(2);
   unsound.events.push_back({3.0, "error", "daq_lost", "no answer"});

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <array>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -63,15 +64,9 @@ struct CompareOptions {
 };
 
 std::string_view verb_of(Outcome outcome) {
-  switch (outcome) {
-    case Outcome::agrees:
-      return "agrees with";
-    case Outcome::differs:
-      return "differs from";
-    case Outcome::undecided:
-      break;
-  }
-  return "may agree with or differ from";
+  constexpr std::array<std::string_view, 3> verbs{"agrees with", "differs from",
+                                                  "may agree with or differ from"};
+  return verbs[static_cast<size_t>(outcome)];
 }
 
 std::string undecided_words(const comparison::Departure& departure) {

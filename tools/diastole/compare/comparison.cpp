@@ -169,6 +169,18 @@ void remark_what_is_not_sound(const std::vector<RunFile>& runs, std::vector<std:
   }
 }
 
+/// One run named twice, or a copy of it, agrees whatever its noise.
+void remark_what_is_the_same(const std::vector<RunFile>& runs, std::vector<std::string>& remarks) {
+  for (size_t r = 1; r < runs.size(); ++r) {
+    const auto first =
+        std::ranges::find(runs, runs[r].run.run_id, [](const RunFile& file) { return file.run.run_id; });
+    const auto before = static_cast<size_t>(first - runs.begin());
+    if (before < r && !runs[r].run.run_id.empty())
+      remarks.push_back(fmt::format("{} is the recording of [{}] once more: it says nothing of another",
+                                    runs[r].run.file, before));
+  }
+}
+
 /// Segments and channels that some runs have and others lack.
 void remark_what_lacks(const std::vector<RunFile>& runs, std::vector<std::string>& remarks) {
   const std::vector<Segment>& of_first = runs.front().run.segments;
@@ -229,6 +241,7 @@ Comparison compare(const std::vector<RunFile>& runs, const std::vector<runfile::
     comparison.files.push_back(file.run.file);
   add_differences(comparison, runs, sessions);
   remark_what_is_not_sound(runs, comparison.remarks);
+  remark_what_is_the_same(runs, comparison.remarks);
   for (size_t segment = 0; segment < runs.front().run.segments.size(); ++segment) {
     if (runs.front().run.segments[segment].waveform == "hold") continue;
     for (const std::string& channel : channels_of(runs))
